@@ -25,6 +25,7 @@ from calibrate.effects.form import Form
 from calibrate.effects.ports import Port
 from calibrate.effects.since_model import changes
 from calibrate.effects.term import Term
+from calibrate.effects.time_laws import FEWEST_AFTER
 from calibrate.fit import FAR_START, NEAR_START, Loss, Stop, solve
 from calibrate.identification.session import believed_sigma
 from calibrate.parameters import Parameter, plausible_sizes, priors, start_values
@@ -38,7 +39,8 @@ TURNS = 40  # of weights and least squares; most settle in 5 to 8
 FEWEST_TURNS = 4
 REFRESHED = 2  # turns after which drivers have settled: what a nanometre changes in them decides nothing
 STEPS = 12  # of a solver in a turn: the next one goes on from there
-TOLERANCE = 1e-3  # of chi2 in a turn, 3 % of a sigma
+TOLERANCE = 0.02  # of chi2 in a turn: less than what settles the likelihood
+LAST = 1e-3  # the same in the turn that ends a fit, 3 % of a sigma
 DAMPING = 1e-9  # of the first step: along what the data see it is a Gauss-Newton step
 WILD = 0.1  # weight of a row that may have bent a plain fit
 SWALLOWED = 0.3  # weight of a row that next to nothing of a model follows: five sigmas off
@@ -200,9 +202,9 @@ class Fitted:
         return (*every, *changes(self.drivers))
 
     def refitted(self, accepted: Sequence[Accepted]) -> "Fitted":
-        kept = {a.term.key for a in self.accepted}
+        kept, swallowed = {a.term.key for a in self.accepted}, self.distrusted >= FEWEST_AFTER
         fits = [self._refitted(tuple(accepted), self.noise)]
-        if any(a.term.key not in kept and _makes_outliers(a.term) for a in accepted):
+        if swallowed and any(a.term.key not in kept and _makes_outliers(a.term) for a in accepted):
             fits.append(self._refitted(tuple(accepted), self.noise.trusted))
         return min(fits, key=lambda fit: fit.minus_two_log_likelihood)
 
@@ -294,7 +296,7 @@ def _settled(fitted: Fitted) -> Fitted:
         problem = problem.forgetting() if anew else problem
         if fitted.problem.terms and turn <= REFRESHED:
             problem = problem.refreshed(last.drivers)
-        new = _turn(problem, fitted.active, fitted.values, fitted.noise)
+        new = _turn(problem, fitted.active, fitted.values, fitted.noise, LAST if anew else TOLERANCE)
         fitted = replace(new, steps=fitted.steps + new.steps)
         best = min(best, fitted, key=lambda fit: fit.minus_two_log_likelihood)
         gained = last.minus_two_log_likelihood - fitted.minus_two_log_likelihood
@@ -305,11 +307,11 @@ def _settled(fitted: Fitted) -> Fitted:
     return replace(best, steps=fitted.steps, stop=Stop.ROUNDS)
 
 
-def _turn(problem: Augmented, active: Ints, start: Floats, noise: Noise) -> Fitted:
+def _turn(problem: Augmented, active: Ints, start: Floats, noise: Noise, tolerance: float = TOLERANCE) -> Fitted:
     """Least squares under the noise so far, along what the data see, then the noise that is left."""
     problem = noise.under(problem)
     seen = in_sight(problem, start)
-    fit = solve_in_sight(problem, start, seen, damping=DAMPING, max_steps=STEPS, tolerance=TOLERANCE)
+    fit = solve_in_sight(problem, start, seen, damping=DAMPING, max_steps=STEPS, tolerance=tolerance)
     noise = noise_of(problem, fit)
     return Fitted(problem.session, active, problem, fit.theta, noise, fit.covariance, fit.steps, fit.stop)
 

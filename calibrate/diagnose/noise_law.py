@@ -67,15 +67,15 @@ class Series:
     wander: Wander  # the one that the residual shows
 
     def each(self, residual: Floats) -> Floats:
-        """(form,) -2 log L of a residual (row,); each channel has its own variance."""
-        power = _power(residual[self.rows])
+        """(draw, form) -2 log L of residuals (row, draw); each channel has its own variance."""
         n, k = self.rows.shape
-        variance = (1.0 / self.spectra) @ power / n
-        return k * np.sum(np.log(self.spectra), axis=1) + n * np.sum(np.log(np.maximum(variance, 1e-300)), axis=1)
+        power = _power(residual[self.rows]).reshape(n, -1)
+        log_variance = np.log(np.maximum((1.0 / self.spectra) @ power / n, 1e-300)).reshape(len(self.forms), k, -1)
+        return k * np.sum(np.log(self.spectra), axis=1) + n * np.sum(log_variance, axis=1).T
 
-    def minus_two_log_likelihood(self, residual: Floats) -> float:
-        """The smallest over all forms."""
-        return float(np.min(self.each(residual)))
+    def minus_two_log_likelihood(self, residual: Floats) -> Floats:
+        """(draw,) the smallest over all forms, of residuals (row, draw)."""
+        return np.min(self.each(residual), axis=1)
 
 
 @dataclass(frozen=True)
@@ -96,9 +96,10 @@ class NoiseLaw:
         """See `curvature_of`."""
         return curvature_of(self.rows)
 
-    def gain(self, before: Floats, after: Floats) -> float:
-        """-2 log L from one residual (row,) to another, each with the wander that fits it best."""
-        return sum(s.minus_two_log_likelihood(before) - s.minus_two_log_likelihood(after) for s in self.series)
+    def gain(self, before: Floats, after: Floats) -> Floats:
+        """(draw,) -2 log L from residuals (row, draw) to others, each with the wander that fits it best."""
+        each = (s.minus_two_log_likelihood(before) - s.minus_two_log_likelihood(after) for s in self.series)
+        return np.sum(list(each), axis=0)
 
     def draw(self, rng: Generator, count: int) -> Floats:
         """(row, count): residuals of whole samples with signs and lengths drawn again where noise is white, Gaussian
@@ -208,7 +209,7 @@ def _left(sight: Sight, at: Ints, drawn: Floats) -> Floats:
 
 
 def _strongest(series: Series, residual: Floats) -> Wander:
-    values = series.each(residual)
+    values = series.each(residual[:, None])[0]
     if values[0] - np.min(values) < WANDERS:
         return series.forms[0]
     near = np.flatnonzero(values <= np.min(values) + CONSERVATIVE)

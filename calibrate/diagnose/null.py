@@ -39,7 +39,7 @@ class Null:
         if not slow:
             return min(1.0, FAMILIES * self.fast.p(gain))
         if self.law.wanders:
-            gain = _beyond_wander(self.law, sight.residual, span, cost, sight.data)
+            gain = float(_beyond_wander(self.law, sight.residual[:, None], span, cost, sight.data)[0])
         return self._of_slow(gain)
 
     def p_of_worth(self, slow: bool, sight: Sight, gone: Removed) -> float:
@@ -50,7 +50,8 @@ class Null:
         part = self.law.curvature * gone.part
         if slow and self.law.wanders:
             before = sight.residual + gone.span @ part
-            gain = self.law.gain(before, sight.residual) - gone.cost * float(np.log(sight.data))
+            gained = self.law.gain(before[:, None], sight.residual[:, None])
+            gain = float(gained[0]) - gone.cost * float(np.log(sight.data))
         else:
             squares = float(part @ part)
             gain = float(bic_gain(np.array(squares), sight.rss + squares, np.array(gone.cost), sight.data))
@@ -95,17 +96,15 @@ def _slow_maxima(menu: Menu, law: NoiseLaw, left: Floats, gains: Floats, slow: B
         return np.zeros(0)
     if not law.wanders:
         return np.max(gains[slow], axis=0)
-    best = np.flatnonzero(slow)[np.argmax(gains[slow], axis=0)]
-    spans = {int(entry): directions(menu, int(entry)) for entry in np.unique(best)}
-    return np.array(
-        [
-            _beyond_wander(law, left[:, d], span, len(span) + int(menu.numbers[entry]), menu.sight.data)
-            for d, entry, span in ((d, entry, spans[int(entry)]) for d, entry in enumerate(best))
-        ]
-    )
+    best, out = np.flatnonzero(slow)[np.argmax(gains[slow], axis=0)], np.zeros(left.shape[1])
+    for entry in np.unique(best):
+        span, mine = directions(menu, int(entry)), best == entry
+        cost = len(span) + int(menu.numbers[entry])
+        out[mine] = _beyond_wander(law, left[:, mine], span, cost, menu.sight.data)
+    return out
 
 
-def _beyond_wander(law: NoiseLaw, left: Floats, span: Floats, cost: int, data: int) -> float:
-    """BIC gain of directions (k, row) if noise wanders, whatever way fits best with them and without."""
+def _beyond_wander(law: NoiseLaw, left: Floats, span: Floats, cost: int, data: int) -> Floats:
+    """(draw,) BIC gain of directions (k, row) if noise (row, draw) wanders, as fits best with them and without."""
     after = left - span.T @ (span @ left)
     return law.gain(left, after) - cost * float(np.log(data))
