@@ -19,6 +19,7 @@ from drivers.errors import DeviceRefused
 
 RIG = Path(__file__).parents[2] / "rigs" / "irb120-modbus.toml"
 SMALL = PlanOptions(centred=1, off_centre=1, repeats=1)
+TAKEN = 2 * (1 + 1 + 2)  # two orders; the repeat is taken from either side
 
 
 PLAIN_ENCODERS = f"""
@@ -107,7 +108,7 @@ def test_plain_encoders_are_looked_at_with_the_spots(encoder_rig, tmp_path) -> N
 def test_a_whole_session_with_plain_encoders(run_session, encoder_rig) -> None:
     recording = run_session(encoder_rig)
     assert recording.complete
-    assert len(recording.samples) == 6
+    assert len(recording.samples) == TAKEN
     assert set(recording.streams) == {"psd", "spots", "robot", "encoders"}
     seen_rad = np.column_stack([recording.samples.column(f"enc{joint}_rad") for joint in range(1, 7)])
     assert np.isfinite(seen_rad).all()
@@ -119,7 +120,7 @@ def test_a_whole_session_with_plain_encoders(run_session, encoder_rig) -> None:
 def test_a_whole_session(run_session) -> None:
     recording = run_session()
     assert recording.complete
-    assert len(recording.samples) == 6
+    assert len(recording.samples) == TAKEN
     assert set(recording.streams) == {"psd", "spots", "robot"}
     joints = recording.samples.joints()
     assert np.ptp(joints, axis=0).max() > 0.2  # it went places
