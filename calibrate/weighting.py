@@ -186,14 +186,6 @@ class Weighting:
     def _naming(self, parameters: tuple[Parameter, ...]) -> AbstractContextManager[None]:
         return naming_undetermined([p.name for p in parameters if p.free], self.measured[0].problem.q_rad)
 
-    def rows_of(self, samples: Indices) -> Indices:
-        """Rows of the joint problem that are made of these rows of the table of samples alone; known lengths not."""
-        out = [
-            first + np.flatnonzero(np.isin(instrument.sample_rows, samples).all(axis=1))
-            for instrument, first in zip(self.measured, self.unweighted.first_rows, strict=False)
-        ]
-        return np.concatenate(out)
-
     def take(self, samples: Indices) -> "Weighting":
         """The same instruments over these rows of the table of samples; parameters and known lengths stay."""
         cut = tuple(m.select(np.flatnonzero(np.isin(m.sample_rows, samples).all(axis=1))) for m in self.measured)

@@ -1,7 +1,7 @@
 """Does anything repeat that the model does not know: misfit of repeated poses against the scatter within them.
 
-Repeats are no pure noise (time, approach, payload differ), so both are taken after the model. Sources: Draper, Smith,
-Applied Regression Analysis, 3rd ed. 1998, ch. 2.1; robust scatter: Rousseeuw, Croux, J. Am. Stat. Assoc. 88, 1993.
+Repeats are no pure noise (time, approach, payload differ), so both are taken after the model. Source: Draper, Smith,
+Applied Regression Analysis, 3rd ed. 1998, ch. 2.1.
 """
 
 from dataclasses import dataclass
@@ -24,7 +24,6 @@ class LackOfFit:
     """Misfit that repeats over scatter within repeats, both per degree of freedom."""
 
     groups: int
-    scatter: float  # robust, whitened: 1 is the noise that the fit assumes
     ratio: float
     p: float
 
@@ -40,7 +39,6 @@ def lack_of_fit(bench: Bench) -> LackOfFit | None:
         return None
     group = np.where(rows.data, repeat[np.maximum(rows.sample, 0)], -1)
     within, between, dof_within, dof_between, groups = 0.0, 0.0, 0, 0, 0
-    inner: list[Floats] = []
     for label in np.unique(group[group >= 0]):
         for mine in _channels(rows.group, np.flatnonzero(group == label)):
             if len(mine) < 2:
@@ -49,15 +47,13 @@ def lack_of_fit(bench: Bench) -> LackOfFit | None:
             within += float(np.sum((z - z.mean()) ** 2))
             between += float(len(z) * z.mean() ** 2)
             dof_within, dof_between = dof_within + len(z) - 1, dof_between + 1
-            inner.append((z - z.mean()) * np.sqrt(len(z) / (len(z) - 1.0)))
         groups += 1
     if groups < FEWEST or dof_within == 0 or within <= 0.0:
         return None
     # Geometry follows the means a little: as much as its share of all data.
     free = dof_between * (1.0 - bench.sight.basis.shape[1] / bench.sight.data)
     ratio = (between / max(free, 1.0)) / (within / dof_within)
-    scatter = float(np.median(np.abs(np.concatenate(inner))) / 0.6745)
-    return LackOfFit(groups, scatter, ratio, float(fdtrc(free, dof_within, ratio)))
+    return LackOfFit(groups, ratio, float(fdtrc(free, dof_within, ratio)))
 
 
 def _channels(group: Ints, mine: Ints) -> list[Ints]:

@@ -159,7 +159,6 @@ class Choice:
     poses: Ints
     losses: Floats  # (count + 1,)
     loss: float  # in the end
-    exchanged: int
 
 
 def one_by_one(criterion: Criterion, count: int, total: int) -> tuple[list[int], Floats]:
@@ -194,24 +193,24 @@ def choose(
     starts += [rng.choice(total, min(count, total), replace=False).tolist() for _ in range(DRAWN_STARTS)]
     best: Choice | None = None
     for done, start in enumerate(starts):
-        chosen, loss, exchanged = exchange(criterion, start)
+        chosen, loss = exchange(criterion, start)
         if best is None or loss < best.loss:
-            best = Choice(np.array(chosen, dtype=np.intp), losses, loss, exchanged)
+            best = Choice(np.array(chosen, dtype=np.intp), losses, loss)
         progress(done + 1, len(starts))
     if best is None:
         raise ValueError("no start: give candidates")
     return best
 
 
-def exchange(criterion: Criterion, start: Sequence[int]) -> tuple[list[int], float, int]:
-    """Poses, their loss and the number of exchanges, until a round makes none."""
-    chosen, exchanged = list(start), 0
+def exchange(criterion: Criterion, start: Sequence[int]) -> tuple[list[int], float]:
+    """Poses and their loss, when a round makes no exchange."""
+    chosen = list(start)
     known = criterion.start()
     for pose in chosen:
         known = criterion.with_(known, pose)
     now = criterion.loss(known)
     for _ in range(ROUNDS):
-        changed = 0
+        changed = False
         for pose in _least_useful(criterion, known, chosen):
             less = criterion.without(known, pose)
             savings = criterion.savings(less)
@@ -221,11 +220,10 @@ def exchange(criterion: Criterion, start: Sequence[int]) -> tuple[list[int], flo
             loss = criterion.loss(new)
             if best != pose and loss < now - BETTER * abs(now):
                 chosen[chosen.index(pose)] = best
-                known, now, changed = new, loss, changed + 1
-        exchanged += changed
-        if changed == 0:
+                known, now, changed = new, loss, True
+        if not changed:
             break
-    return chosen, now, exchanged
+    return chosen, now
 
 
 def _least_useful(criterion: Criterion, A: Floats, chosen: list[int]) -> list[int]:

@@ -57,7 +57,6 @@ def site_of(wanted: Wanted, drawn: DrawnRig, table: Timetable) -> Site:
         seats=seats,
         half_size_m=true.instrument.half_size_m if isinstance(true.instrument, DualPsd) else 0.0,
         duration_s=float(scene.t_s[-1]),
-        extras=tuple(scene.extra),
     )
 
 

@@ -222,7 +222,7 @@ def _on_site(site: Site, wanted: Wanted) -> Site:
     """Times of a session that takes place after place, as quickly as an arm goes."""
     stay_s = A_SAMPLE_S * wanted.samples / len(site.places)
     stays = tuple((place, k * stay_s, (k + 1) * stay_s) for k, place in enumerate(site.places))
-    return replace(site, duration_s=stay_s * len(site.places), stays_s=stays, extras=())
+    return replace(site, duration_s=stay_s * len(site.places), stays_s=stays)
 
 
 def _timetable(taken: Taken) -> Timetable:

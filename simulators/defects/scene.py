@@ -79,7 +79,6 @@ class Site:
     seats: tuple[int, ...]
     half_size_m: float
     duration_s: float
-    extras: tuple[str, ...]  # columns beside the named ones
 
     def stay_s(self, place: int, rng: np.random.Generator) -> tuple[float, float]:
         """A moment well within a stay of the fixture at a place, and the end of that stay (s)."""

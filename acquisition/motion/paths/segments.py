@@ -14,13 +14,12 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Place:
-    """`coord` None: fixed in the base. `carried_by` names the moving coordinates: places that share it share COORD."""
+    """`coord` None: fixed in the base."""
 
     name: str
     pos: Floats  # (4, 4) of the tool in its coordinates
     tool: Floats  # (4, 4) of the tool on the flange
     coord: Callable[[float], Floats] | None = None
-    carried_by: str = ""
 
     def coord_at(self, s_m: float) -> Floats:
         """COORD(s), (4, 4)."""

@@ -90,13 +90,7 @@ class TaskGraph:
         tool = product(behind, self.value)
         if not carrying:
             return Place(position, still, tool)
-        return Place(
-            position,
-            still,
-            tool,
-            lambda s_m: product(carrying, lambda name: self.value(name, s_m)),
-            str(Equation(carrying, ())),
-        )
+        return Place(position, still, tool, lambda s_m: product(carrying, lambda name: self.value(name, s_m)))
 
     def check(self, tolerance_m: float = 1e-6, tolerance_rad: float = 1e-6, s_m: float = 0.0) -> None:
         """TaskError naming the first relation whose transforms are all known and do not close, and by how much."""

@@ -36,7 +36,6 @@ class Following:
     behind_sigma_s: float | None = None
     by_acceleration_s2: float | None = None
     by_acceleration_sigma_s2: float | None = None
-    largest_rad: float | None = None  # in this motion
     kind: str = "undetermined"  # "delay", "first-order lag", "undetermined"
     p: float = 1.0
 
@@ -71,7 +70,6 @@ def _joint(joint: int, error: Floats, v: Floats, a: Floats, block: NDArray[np.in
     behind_s, sigma_s = float(line.values[0]), float(line.sigma[0])
     p = float(2.0 * norm.sf(abs(behind_s) / max(sigma_s, 1e-300)))
     found = p < ALARM and abs(behind_s) > SMALLEST_S
-    moving = np.abs(v) > SLOWEST_RAD_S
     return Following(
         joint,
         Outcome.FOUND if found else Outcome.ABSENT,
@@ -79,7 +77,6 @@ def _joint(joint: int, error: Floats, v: Floats, a: Floats, block: NDArray[np.in
         sigma_s,
         float(line.values[1]),
         float(line.sigma[1]),
-        float(np.max(np.abs(error[moving]), initial=0.0)),
         _kind(line) if found else "undetermined",
         p,
     )

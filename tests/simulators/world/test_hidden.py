@@ -38,7 +38,6 @@ SITE = Site(
     seats=(),
     half_size_m=0.01,
     duration_s=4.0,
-    extras=(),
 )
 
 
