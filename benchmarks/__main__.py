@@ -115,7 +115,7 @@ def run_speed() -> None:
 
 
 def run_real() -> None:
-    print("diagnosis of the real recordings")
+    print("real recordings: unseen blocks by the model files of identify and diagnose")
     for row in real_diagnosis.lines(RIG.parents[2] / "shared" / "data"):
         print(row, flush=True)
 
