@@ -117,20 +117,16 @@ class Bench:
     def behind(self, accepted: Accepted) -> Floats:
         """(row,) an accepted term's contribution that geometry cannot absorb."""
         amount = self.contribution(accepted)
-        return amount - self._geometry @ (self._geometry.T @ amount)
+        return amount - self.geometry @ (self.geometry.T @ amount)
 
     @cached_property
-    def _geometry(self) -> Floats:
-        return sight_of_geometry(self, np.isin(self.state.rows.owner, range(len(self.state.accepted))))
+    def geometry(self) -> Floats:
+        """(row, rank) orthonormal: what is fitted, without the terms."""
+        own = np.isin(self.state.rows.owner, range(len(self.state.accepted)))
+        return np.linalg.qr(self.state.rows.geometry[:, ~own])[0]
 
     def _share(self, i: int) -> float:
         """Of the contribution itself: combinations that the data do not need do not count."""
         behind = self.behind(self.state.accepted[i])
         alone = self.gone[i].span.T @ self.contribution(self.state.accepted[i])
         return float(alone @ alone / max(behind @ behind, 1e-300))
-
-
-def sight_of_geometry(bench: Bench, own: NDArray[np.bool_]) -> Floats:
-    """(row, rank) basis of geometry without any term."""
-    U, _ = np.linalg.qr(bench.state.rows.geometry[:, ~own])
-    return U

@@ -77,7 +77,7 @@ class Finding:
     confidence: float
     p: float  # family-wise, of nothing at all looking like this
     gain: float  # of BIC when taken out and everything else refitted
-    predicts: float  # 2 ln L that it gains on rows held out
+    predicts: float  # squares that it saves on rows held out, in variances, less one standard error
     says: str
     rivals: tuple[RivalName, ...]
     pulled: Pulled | None

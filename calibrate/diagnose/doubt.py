@@ -9,7 +9,10 @@ the fewest drivers and of the lowest harmonic (numbers are paid for by BIC alrea
 The search compares candidates by linear scores, which are off by some units of BIC where robust weights or inner values
 would settle elsewhere.
 
-Does each term predict rows that the fit has not seen: exact for the linearised model, without a refit.
+Does each term predict rows that the fit has not seen, whole blocks in time and whole regions of the workspace, for a
+row beside its neighbours is half seen: exact for the linearised model, without a refit. By the rule of one standard
+error a shorter model that predicts hardly worse is taken: Breiman et al., Classification and regression trees, 1984,
+section 3.4.3.
 Errors of a fold that was left out are (I - H_ff)^-1 r_f. Source: Cook, Weisberg, Residuals and Influence in Regression,
 1982, section 2.2 (several rows deleted).
 
@@ -28,7 +31,7 @@ from calibrate.diagnose.bench import Bench
 from calibrate.diagnose.diagnosis import Finding, Unexplained, Verdict
 from calibrate.diagnose.drifts import doubtful, suspects, untold
 from calibrate.diagnose.findings import bare_findings, findings_of
-from calibrate.diagnose.folds import k_folds, units
+from calibrate.diagnose.folds import REGIONS, blocks, regions, units
 from calibrate.diagnose.hidden_levers import TIME
 from calibrate.diagnose.lack_of_fit import LackOfFit, lack_of_fit
 from calibrate.diagnose.linearised import Accepted, State
@@ -56,9 +59,8 @@ Rivals = tuple[tuple[Rival, ...], ...]
 
 Floats = NDArray[np.float64]
 
-FOLDS = 10
+FOLDS = 5  # of blocks in time
 RIDGE = 1e-9  # keeps a direction that only one fold knows finite
-NU = 5.0  # of the law of noise, as in calibrate/diagnose/scatter.py
 
 Ints = NDArray[np.intp]
 
@@ -98,9 +100,7 @@ def doubted(
     at = _found(state, rng, stages)
     if known is not None:
         known(Doubted(at, bare_findings(at), (), None, (), undecided=True))
-    at, rivals = stages.attempt(
-        Stage.ALTERNATIVES, lambda: _named_best(at, rng), (at, tuple(() for _ in at.state.accepted))
-    )
+    at, rivals = stages.attempt(Stage.ALTERNATIVES, lambda: _named_best(at), (at, tuple(() for _ in at.state.accepted)))
     scatter = stages.attempt(Stage.SCATTER, lambda: unrecorded(at.bench, rng, missing), None)
     misfit = stages.attempt(Stage.REPEATS, lambda: lack_of_fit(at.bench), None)
     lasting = stages.attempt(Stage.TIME, lambda: time_left(at.bench, rng), None)
@@ -109,7 +109,7 @@ def doubted(
     left = [*_scattered(scatter), *_repeated(misfit), *_lasting(lasting), *moving]
     final = not left and not stages.undecided
     findings = stages.attempt(
-        Stage.SIZES, lambda: findings_of(at, rivals, predicts(at.bench, rng), final), bare_findings(at)
+        Stage.SIZES, lambda: findings_of(at, rivals, predicts(at.bench), final), bare_findings(at)
     )
     drifts = [(f, hidden) for f in findings if (hidden := suspects(f, missing))]
     findings = tuple(doubtful(f) if suspects(f, missing) else f for f in findings)
@@ -126,20 +126,20 @@ def _found(state: State, rng: Generator, stages: Stages) -> Search:
     few = stages.attempt(Stage.SEARCH, lambda: thinned(state, rng), state)
     at = stages.attempt(Stage.SEARCH, lambda: search(few, rng), Search(Bench(few), rng))
     at = stages.attempt(Stage.UNKNOWN, lambda: with_unknowns(at), at)
-    at = stages.attempt(Stage.PREDICTION, lambda: _predicting(at, rng), at)
+    at = stages.attempt(Stage.PREDICTION, lambda: _predicting(at), at)
     return at.at(Bench(state.refitted(at.state.accepted))) if at.state.samples < state.samples else at
 
 
-def _named_best(at: Search, rng: Generator) -> tuple[Search, Rivals]:
+def _named_best(at: Search) -> tuple[Search, Rivals]:
     at, rivals = with_best_names(at)
-    kept = _predicting(at, rng)
+    kept = _predicting(at)
     return (at, rivals) if kept is at else with_best_names(kept)
 
 
-def _predicting(at: Search, rng: Generator) -> Search:
+def _predicting(at: Search) -> Search:
     """Without terms that do not help on rows held out, or are not worth their parameters any more, the worst first."""
     while at.state.accepted:
-        wins = predicts(at.bench, rng)
+        wins = predicts(at.bench)
         worth = np.array([gain_of(gone, at.bench.sight) for gone in at.bench.gone])
         worst = int(np.argmin(np.minimum(wins, worth)))
         if min(wins[worst], worth[worst]) > 0.0:
@@ -231,36 +231,44 @@ def _rank(at: Search, candidate: tuple[float, Accepted], least: float, own: Acce
     return (margin - BETTER if accepted is own else margin), 0
 
 
-def predicts(bench: Bench, rng: Generator) -> Floats:
-    """(term,) 2 ln L of unseen rows that each accepted term gains; below zero it only fitted noise.
+def predicts(bench: Bench) -> Floats:
+    """(term,) squares of unseen rows that each accepted term saves, in variances of the noise, less one standard error;
+    below zero it only fitted noise. The lesser of what it saves on blocks in time and on regions of the workspace.
 
     Beside a model of another recording that recording counts, too: many rows of the new one bend a model until it
     predicts them well, at the cost of all that was known. It is not held out, so each value costs two (Akaike 1974).
     """
-    rows = bench.state.rows
-    data = np.flatnonzero(rows.data)
-    labels = units(bench.state.drivers)[rows.sample[data]]
-    folds = [data[f] for f in k_folds(labels, FOLDS, rng)]
-    whole = _loss(bench.sight.basis, bench.sight.residual, folds)
-    out: list[float] = []
-    for gone in bench.gone:
-        # The span of the model without a term: the complement of what only the term spans.
-        basis = bench.sight.basis - gone.span @ (gone.span.T @ bench.sight.basis)
-        without = bench.sight.residual + gone.span @ gone.part
-        known = float(np.sum(without[rows.stated] ** 2) - np.sum(bench.sight.residual[rows.stated] ** 2))
-        out.append(_loss(basis, without, folds) - whole + max(known - 2.0 * gone.cost, 0.0))
-    return np.array(out)
+    rows, data = bench.state.rows, np.flatnonzero(bench.state.rows.data)
+    out, known = np.full(len(bench.gone), np.inf), np.zeros(len(bench.gone))
+    for parts, count in ((blocks(bench.state.drivers), FOLDS), (regions(bench.state.drivers), REGIONS)):
+        part = parts[rows.sample[data]]
+        folds, met = [data[part % count == fold] for fold in range(count)], np.unique(part)
+        whole = _unseen_squares(bench.sight.basis, bench.sight.residual, folds, bench.geometry)
+        for i, gone in enumerate(bench.gone):
+            # The span of the model without a term: the complement of what only the term spans.
+            basis = bench.sight.basis - gone.span @ (gone.span.T @ bench.sight.basis)
+            without = bench.sight.residual + gone.span @ gone.part
+            saved = np.bincount(part, (_unseen_squares(basis, without, folds, bench.geometry) - whole)[data])[met]
+            out[i] = min(out[i], np.sum(saved) - np.std(saved) * np.sqrt(len(saved)))
+            told = float(np.sum(without[rows.stated] ** 2) - np.sum(bench.sight.residual[rows.stated] ** 2))
+            known[i] = max(told - 2.0 * gone.cost, 0.0)
+    return out + known
 
 
-def _loss(basis: Floats, residual: Floats, folds: list[NDArray[np.intp]]) -> float:
-    """-2 log L of Student's t law, rows apart. `basis` may be an orthonormal one less some directions."""
-    total, p = 0.0, basis.shape[1]
+def _unseen_squares(basis: Floats, residual: Floats, folds: Sequence[Ints], geometry: Floats) -> Floats:
+    """(row,) squared errors of rows left out. `basis` may be an orthonormal one less some directions.
+
+    In units of how well `geometry` (row, rank), orthonormal, predicts a fold from the others: what no other row
+    determines is no fault of a term, but where a term runs away beyond the rows that it was fitted to, it is.
+    """
+    out, p = np.zeros(len(residual)), basis.shape[1]
     for fold in folds:
         # (I - Q Q')^-1 r = r + Q (I - Q' Q)^-1 Q' r: a fold has more rows than the model has directions.
         Q = basis[fold]
         error = residual[fold] + Q @ np.linalg.solve((1.0 + RIDGE) * np.eye(p) - Q.T @ Q, Q.T @ residual[fold])
-        total += float(np.sum((NU + 1.0) * np.log1p(error**2 / NU)))
-    return total
+        U, s, _ = np.linalg.svd(geometry[fold], full_matrices=False)
+        out[fold] = (error - U @ ((1.0 - np.sqrt(np.maximum(1.0 - s**2, 0.0))) * (U.T @ error))) ** 2
+    return out
 
 
 def thinned(state: State, rng: Generator) -> State:

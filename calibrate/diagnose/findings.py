@@ -21,6 +21,7 @@ from calibrate.diagnose.bench import Bench
 from calibrate.diagnose.curve import unit_of
 from calibrate.diagnose.diagnosis import UNKNOWN, Finding, Named, RivalName
 from calibrate.diagnose.linearised import Accepted
+from calibrate.diagnose.null import DRAWS
 from calibrate.diagnose.port_process import lever
 from calibrate.diagnose.pulled_back import pulled_back
 from calibrate.diagnose.rivals import Rival, confidences
@@ -34,6 +35,9 @@ Floats = NDArray[np.float64]
 NOT_FINAL = 0.5  # of the confidence in a name that may be the rest of something else
 ALIKE = 1e-6  # sine between what two names can make of the readings
 FAINT = 0.05  # a name that is less likely is none
+SIGMAS = 3.0  # of a size, for a name
+NO_SIZE = ("phase", "time", "period", "degree")  # words of parameters for where or when, not how much
+UNPROVED = 1.0 / (DRAWS + 1)  # of sessions with nothing in them: so many were drawn, and more is not shown by them
 LEFTOVER = 0.1  # of what an unknown cause explains: a curve may leave so much of a law that it only resembles
 
 SEVERAL = 3  # two may share a joint
@@ -60,10 +64,17 @@ def findings_of(
     names = [_finding(at, i, rivals[i], float(predicts[i])) for i in closed]
     unknown = [unknown_cause(at, group, predicts) for group in unnamed]
     names = [f if final and _final(f, unknown) else f.believed(NOT_FINAL) for f in names]
-    names = [f if f.confidence >= FAINT else _unsure(at, i, f, predicts) for i, f in zip(closed, names, strict=True)]
+    sure = [f.confidence >= FAINT and _sized(f) for f in names]
+    names = [f if ok else _unsure(at, i, f, predicts) for i, f, ok in zip(closed, names, sure, strict=True)]
     explained = max(sum(f.share for f in (*names, *unknown)), 1e-300)
     found = [replace(f, share=f.share / explained) for f in (*_no_leftovers(names, unknown), *unknown)]
     return tuple(sorted(found, key=lambda f: -f.share))
+
+
+def _sized(finding: Finding) -> bool:
+    """Whether any of its sizes is certain to be one: a name of nothing in particular is none."""
+    told = [size for name, size in finding.parameters.items() if not name.startswith(NO_SIZE)]
+    return not told or any(abs(size.value) >= SIGMAS * size.sigma for size in told)
 
 
 def _unsure(at: Search, i: int, finding: Finding, predicts: Floats) -> Finding:
@@ -128,7 +139,7 @@ def _finding(at: Search, i: int, rivals: Sequence[Rival], predicts: float) -> Fi
         name=named(a.term),
         parameters=sizes,
         share=bench.gone[i].squares,
-        confidence=float(belief[same].sum()) * (1.0 - p),
+        confidence=float(belief[same].sum()) * (1.0 - max(p, UNPROVED)),
         p=p,
         gain=gain_of(bench.gone[i], bench.sight),
         predicts=predicts,
@@ -201,7 +212,7 @@ def unknown_cause(at: Search, group: Sequence[int], predicts: Floats) -> Finding
         name=Named(where, drivers, mine[0].term.shape.value, None, UNKNOWN),
         parameters={name: size},
         share=gone.squares,
-        confidence=1.0 - p,
+        confidence=1.0 - max(p, UNPROVED),
         p=p,
         gain=gain_of(gone, bench.sight),
         predicts=float(sum(predicts[i] for i in group)),

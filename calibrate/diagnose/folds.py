@@ -1,18 +1,20 @@
 """Which samples a proof leaves out: at random, each place in turn, the end of the session. Repeats stay together."""
 
-from collections.abc import Sequence
-
 import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
 from calibrate.effects.drivers import Drivers
+from calibrate.effects.gravity import point_of
 from calibrate.uncertainty.splits import Split, by_place, last_block
 
 Ints = NDArray[np.intp]
 
 SHARE = 0.2  # of the samples
 MOST = 3  # places that are left out in turn, the largest ones: each costs two refits
+BLOCKS = 50  # of a session in time
+HALVINGS = 3  # of the workspace
+REGIONS = 2**HALVINGS
 FEWEST = 10  # samples of a place, and of anything that is left out
 
 
@@ -50,10 +52,23 @@ def places(drivers: Drivers) -> Ints:
     return out
 
 
-def k_folds(labels: Ints, k: int, rng: Generator) -> Sequence[Ints]:
-    """Indices of `labels` (row,) in k parts, equal labels together."""
-    names = rng.permutation(np.unique(labels))
-    return [np.flatnonzero(np.isin(labels, part)) for part in np.array_split(names, k)]
+def blocks(drivers: Drivers) -> Ints:
+    """(sample,) number of its block in time; visits of one pose are where its first one is."""
+    rank = np.argsort(np.argsort(drivers.t_s, kind="stable"))
+    _, first, label = np.unique(units(drivers), return_index=True, return_inverse=True)
+    return np.asarray((rank * BLOCKS // max(len(rank), 1))[first][label])
+
+
+def regions(drivers: Drivers) -> Ints:
+    """(sample,) number of its region of the workspace, which is halved where the flange goes furthest."""
+    _, first, label = np.unique(units(drivers), return_index=True, return_inverse=True)
+    place_m, region = point_of(drivers, drivers.n_joints, (0.0, 0.0, 0.0))[first], np.zeros(len(first), dtype=np.intp)
+    for _ in range(HALVINGS):
+        for mine in [np.flatnonzero(region == number) for number in np.unique(region)]:
+            along = place_m[mine][:, np.argmax(np.ptp(place_m[mine], axis=0))]
+            halved = mine[np.argsort(along, kind="stable")]
+            region[halved] = 2 * region[halved] + (2 * np.arange(len(mine)) >= len(mine))
+    return region[label]
 
 
 def _at_random(drivers: Drivers, samples: Ints, rng: Generator) -> tuple[Ints, ...]:

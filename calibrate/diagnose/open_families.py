@@ -11,7 +11,7 @@ from calibrate.diagnose.bench import Bench
 from calibrate.diagnose.curve import Curve
 from calibrate.diagnose.line_search import refined, solved
 from calibrate.diagnose.linearised import Accepted
-from calibrate.diagnose.null import gains_of, is_slow
+from calibrate.diagnose.null import gains_of
 from calibrate.diagnose.port_process import WAVES, Processes, places_of, processes
 from calibrate.diagnose.score import Removed, bic_gain, scores
 from calibrate.effects.ports import Place
@@ -83,11 +83,6 @@ def open_families(bench: Bench) -> Families:
 def anything(term: Term) -> bool:
     """No restriction."""
     return True
-
-
-def fast_only(term: Term) -> bool:
-    """No function of time, where noise may wander."""
-    return not is_slow(term)
 
 
 def fitted_curve(bench: Bench, offer: Offer, without: Removed | None) -> Accepted:

@@ -20,6 +20,7 @@ ALPHA_FURTHER = 0.01
 # Of BIC: accepted for now without drawing a null; the last check draws one for all. Slow ones face a wander, too.
 SURE, SURE_SLOW = 60.0, 150.0
 BETTER = 0.5  # of BIC, for an exchange
+HELD = 2  # harmonics of a turn that a smooth curve over a part of it can be
 PLACE = "place"  # what variants that name one begin with
 
 
@@ -42,12 +43,23 @@ class Search:
 
     @property
     def causes(self) -> frozenset[Key]:
-        """Of the accepted terms: one term for one cause, whatever its variant."""
-        return frozenset(cause_of(a.term) for a in self.state.accepted)
+        """Of the accepted terms, one term for one cause, whatever its variant; and what their curves hold already."""
+        own = frozenset(cause_of(a.term) for a in self.state.accepted)
+        curves = [a.term for a in self.state.accepted]
+        return own | frozenset(cause_of(t) for t in self.bench.menu.terms if any(holds(curve, t) for curve in curves))
 
     def at(self, bench: Bench) -> "Search":
         """Banned terms have another chance as soon as the model is another."""
         return replace(self, bench=bench, banned=frozenset())
+
+
+def holds(curve: Term, term: Term) -> bool:
+    """Whether a smooth curve can be all that a term of the same place is: side by side they would balance each other
+    where rows are, and part where there is none.
+    """
+    smooth = curve.open and not curve.variant  # variants are of one shape: a bump, a period
+    within = curve.port.where == term.port.where and set(term.depends_on) <= set(curve.depends_on)
+    return smooth and within and (term.order or 1) <= HELD
 
 
 def cause_of(term: Term) -> Key:

@@ -14,13 +14,12 @@ from scipy.stats import norm
 
 from calibrate.diagnose.bench import Bench
 from calibrate.diagnose.diagnosis import Named
-from calibrate.diagnose.findings import named
+from calibrate.diagnose.findings import NO_SIZE, named
 from calibrate.diagnose.visible import VISIBLE, Block
 
 Floats = NDArray[np.float64]
 
 LEVEL, POWER = 0.05, 0.95
-NO_SIZE = ("phase", "time", "period", "degree")  # words of parameters for where or when, not how much
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ evidence, Kass, Raftery, J. Am. Stat. Assoc. 90(430), 1995, section 3.2). One re
 from there once for all offers of a round.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 
@@ -16,11 +16,12 @@ from calibrate.diagnose.bench import Bench
 from calibrate.diagnose.curve import Curve
 from calibrate.diagnose.linearised import Accepted
 from calibrate.diagnose.noise_law import noise_law
-from calibrate.diagnose.open_families import Allowed, Families, Offer, anything, fast_only, fitted_curve, open_families
+from calibrate.diagnose.null import is_slow
+from calibrate.diagnose.open_families import Allowed, Families, Offer, anything, fitted_curve, open_families
 from calibrate.diagnose.pruning import CANCELS
 from calibrate.diagnose.score import gain_of, removed
 from calibrate.diagnose.search import grown_out
-from calibrate.diagnose.searching import ALPHA_FURTHER, SURE, Key, Search, cause_of
+from calibrate.diagnose.searching import ALPHA_FURTHER, SURE, Key, Search, cause_of, holds
 from calibrate.diagnose.tail import Tail
 from calibrate.effects.ports import Place
 from calibrate.effects.term import Term
@@ -98,8 +99,8 @@ def _enough(at: Search, count: int) -> float:
 
 
 def _groups(at: Search) -> list[tuple[int, ...]]:
-    """Accepted terms by port, where something is named or a curve might be another; two names that all but cancel each
-    other, wherever they are; and all names together.
+    """Accepted terms by port, where something is named or a curve might be another, and the names among them; two names
+    that all but cancel each other, wherever they are; and all names together.
     """
     terms = [a.term for a in at.state.accepted]
     groups = {
@@ -107,6 +108,7 @@ def _groups(at: Search) -> list[tuple[int, ...]]:
         for where in {term.port.where for term in terms}
     }
     named = tuple(i for i, term in enumerate(terms) if not term.open)
+    groups |= {tuple(i for i in named if terms[i].port.where == terms[j].port.where) for j in named}
     if len(named) > 1:
         groups |= {named} | {pair for pair in combinations(named, 2) if cancel(at.bench, pair)}
     return sorted(groups)
@@ -137,8 +139,11 @@ def _remaining(at: Search, least: float) -> Search | None:
     """With the best open term of more than the `least` gain."""
     families = open_families(at.bench)
     law = noise_law(at.state.rows, at.bench.sight, at.state.drivers.t_s, at.rng)
-    free = _beside(a.term for a in at.state.accepted if a.term.open)
-    asked = _both(free, fast_only) if law.wanders else free
+    free = _beside([a.term for a in at.state.accepted])
+
+    def asked(term: Term) -> bool:
+        return free(term) and not (law.wanders and is_slow(term))
+
     offer = families.best(None, asked, least)
     if offer is None:
         return None
@@ -161,13 +166,14 @@ def _best_name(at: Search) -> float:
     return float(np.max(at.bench.scores.gain, where=free, initial=0.0))
 
 
-def _beside(accepted: Iterable[Term]) -> Allowed:
+def _beside(accepted: Sequence[Term]) -> Allowed:
     """What is not one more function of the same drivers at the same place: two of those balance each other."""
-    taken = [(_spot(term), set(term.depends_on)) for term in accepted]
+    taken = [(_spot(term), set(term.depends_on)) for term in accepted if term.open]
 
     def allowed(term: Term) -> bool:
         own, drivers = _spot(term), set(term.depends_on)
-        return not any(spot == own and (drivers <= other or other <= drivers) for spot, other in taken)
+        twice = any(spot == own and (drivers <= other or other <= drivers) for spot, other in taken)
+        return not (twice or any(holds(term, other) for other in accepted))
 
     return allowed
 
@@ -176,10 +182,6 @@ def _spot(term: Term) -> tuple[str, int]:
     """Port, and the component of it where it has several that are no matter of each other."""
     component = term.component if isinstance(term, Curve) and term.port.place is not Place.JOINTS else -1
     return term.port.where, component
-
-
-def _both(one: Allowed, other: Allowed) -> Allowed:
-    return lambda term: one(term) and other(term)
 
 
 def _with(at: Search, accepted: list[Accepted], tested: Mapping[Key, float]) -> Search:

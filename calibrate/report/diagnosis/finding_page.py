@@ -228,7 +228,7 @@ def _proof(finding: FindingRecord) -> Iterator[tuple[str, str]]:
     yield "chance that noise alone resembles any cause as much", chance
     if finding.bic_gain is not None and finding.held_out_gain is not None:
         yield "information it brings (BIC)", fixed(finding.bic_gain, 1)
-        yield "gain on samples held out (2 ln L)", fixed(finding.held_out_gain, 1)
+        yield "saved on samples held out (variances)", fixed(finding.held_out_gain, 1)
 
 
 def _when(finding: FindingRecord) -> str:

@@ -1,12 +1,15 @@
 """Rivals, isolability, lack of fit, unrecorded drivers, proof, next poses."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from calibrate.diagnose.bench import Bench
 from calibrate.diagnose.diagnose import diagnose
-from calibrate.diagnose.diagnosis import Verdict
+from calibrate.diagnose.diagnosis import UNKNOWN, Verdict
 from calibrate.diagnose.doubt import predicts
+from calibrate.diagnose.findings import findings_of
 from calibrate.diagnose.isolability import isolability
 from calibrate.diagnose.lack_of_fit import lack_of_fit
 from calibrate.diagnose.line_search import refined
@@ -99,7 +102,7 @@ def test_terms_that_are_there_predict_and_others_do_not(world):
         bench = Bench(session)
         there = refined(bench, by_cause(session, "joint2.angle", "encoder-eccentricity"), np.zeros(0))
         absent = refined(bench, by_cause(session, "joint4.angle", "axis-wobble", ("q1",)), np.zeros(0))
-        wins = predicts(Bench(session.refitted([there, absent])), rng)
+        wins = predicts(Bench(session.refitted([there, absent])))
         good.append(wins[0])
         bad.append(wins[1])
     assert min(good) > 20.0
@@ -155,3 +158,23 @@ def test_next_poses_separate_better_than_random_ones():
     left = all_y - all_X @ np.linalg.lstsq(all_X, all_y, rcond=None)[0]
     assert chosen.separation[-1] > 2.0 * left @ left
     assert np.all(np.diff(chosen.separation) >= 0.0)
+
+
+def test_no_confidence_exceeds_what_the_drawn_sessions_prove(world):
+    rng = np.random.default_rng(1)
+    found = diagnose(world.session(rng, [(world.at_joint(2, sine(2)), 5.0)]), rng)
+    assert 0.99 < found.findings[0].confidence <= 1.0 - 1.0 / 601
+
+
+def test_a_name_without_a_size_of_three_sigma_is_an_unknown_cause(world, monkeypatch):
+    rng = np.random.default_rng(1)
+    found = search(world.session(rng, [(world.at_joint(2, sine(2)), 2.0)]), rng)
+    (sure,) = findings_of(found, [()], predicts(found.bench))
+    assert sure.name.physics != UNKNOWN
+
+    def vague_sizes(bench, i):
+        return {name: replace(size, sigma=0.4 * abs(size.value)) for name, size in sizes_of(bench, i).items()}
+
+    monkeypatch.setattr("calibrate.diagnose.findings.sizes_of", vague_sizes)
+    (vague,) = findings_of(found, [()], predicts(found.bench))
+    assert vague.name.physics == UNKNOWN

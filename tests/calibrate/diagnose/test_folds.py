@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from calibrate.diagnose.folds import FEWEST, splits_of, units
+from calibrate.diagnose.folds import FEWEST, blocks, regions, splits_of, units
 
 
 def random_split(world, samples):
@@ -33,3 +33,27 @@ def test_repeats_of_a_pose_are_left_out_together(world):
     split = next(s for s in splits_of(drivers, np.arange(200), np.random.default_rng(1)) if s.says == "random")
     known = np.setdiff1d(np.arange(200), np.concatenate(split.unseen))
     assert not set(units(drivers)[known]) & set(units(drivers)[np.concatenate(split.unseen)])
+
+
+@pytest.mark.parametrize(("parts_of", "count"), [(blocks, 50), (regions, 8)])
+def test_parts_hold_visits_of_a_pose_together_and_are_small(world, parts_of, count):
+    drivers = world.session(np.random.default_rng(4)).drivers
+    parts = parts_of(drivers)
+    for visited in np.unique(units(drivers)):
+        assert len(np.unique(parts[units(drivers) == visited])) == 1
+    assert parts.min() >= 0
+    assert parts.max() < count
+    assert np.bincount(parts).max() <= 0.3 * len(drivers.t_s)
+
+
+def test_a_block_is_of_neighbours_in_time_and_a_region_of_neighbours_in_space(world):
+    drivers = replace(world.session(np.random.default_rng(4)).drivers, repeat=None)
+    n, x = len(drivers.t_s), np.random.default_rng(1).random(len(drivers.t_s))
+    frames = drivers.frames.copy()
+    frames[:, -1, 0, 3] = x
+    drivers = replace(drivers, frames=frames)
+    order, block, region = np.argsort(np.argsort(drivers.t_s)), blocks(drivers), regions(drivers)
+    for one in range(50):
+        assert np.ptp(order[block == one]) < n / 25
+    for one in range(8):
+        assert np.ptp(x[region == one]) < 0.3

@@ -14,6 +14,7 @@ from calibrate.diagnose.open_families import anything, fitted_curve, open_famili
 from calibrate.diagnose.port_process import places_of, processes
 from calibrate.diagnose.score import removed
 from calibrate.diagnose.search import search
+from calibrate.diagnose.searching import holds
 from calibrate.diagnose.unknown import cancel, with_unknowns
 
 SIZE_RAD = 1.5
@@ -42,7 +43,7 @@ def test_all_that_is_unknown_at_one_port_is_one_finding_with_its_drivers(world):
     found = with_unknowns(search(world.session(rng, truth), rng))
     unknown = [a for a in found.state.accepted if a.term.open]
     assert len(unknown) >= 2
-    said = findings_of(found, [()] * len(found.state.accepted), predicts(found.bench, rng))
+    said = findings_of(found, [()] * len(found.state.accepted), predicts(found.bench))
     (one,) = [f for f in said if f.name.where == "joint3.angle"]
     assert one.name.physics == "unknown"
     assert set(one.name.depends_on) >= {"q2", "q3", "q4"}
@@ -57,7 +58,7 @@ def test_the_size_of_an_unknown_cause_is_what_the_readings_show(world):
         rng = np.random.default_rng(seed)
         session = moved_by(world, rng, 3, wavy, SIZE_RAD)
         found = with_unknowns(search(session, rng))
-        said = findings_of(found, [()] * len(found.state.accepted), predicts(found.bench, rng))
+        said = findings_of(found, [()] * len(found.state.accepted), predicts(found.bench))
         (size,) = said[0].parameters.values()
         true = SIZE_RAD * np.sqrt(np.mean(wavy(session.drivers) ** 2))
         within += 0.75 * true < size.value < 1.1 * true
@@ -105,6 +106,16 @@ def test_the_best_curve_is_the_best_of_all_curves(world):
         assert every.best(bench.sight.residual, all_of_them, least=float(gains.max()) + 0.1) is None
 
 
+def test_a_curve_holds_slow_harmonics_of_its_own_joint_only(world):
+    terms = [t for t in world.session(np.random.default_rng(5)).candidates() if not t.open]
+    at_joint_2 = [t for t in terms if t.port.where == "joint2.angle" and t.depends_on == ("q2",)]
+    smooth = curve(at_joint_2[0].port, 1, ("q2",), 4)
+    held = [t for t in terms if holds(smooth, t)]
+    assert held
+    assert all(t in at_joint_2 and (t.order or 1) <= 2 for t in held)
+    assert not any(holds(t, at_joint_2[0]) for t in terms)  # a name holds no other
+
+
 def test_curves_of_which_geometry_leaves_nothing_explain_nothing(world):
     bench = Bench(world.session(np.random.default_rng(5), [(world.at_joint(2, uneven), 0.5)]))
     every = processes(bench, places_of(bench), 1)
@@ -127,7 +138,7 @@ def test_terms_taken_out_come_back_into_what_a_curve_may_explain(world):
 
 def test_unseen_errors_are_those_of_leaving_rows_out(world):
     """Against a refit without the fold."""
-    from calibrate.diagnose.doubt import NU, _loss
+    from calibrate.diagnose.doubt import _unseen_squares
 
     rng = np.random.default_rng(5)
     X, y = rng.normal(size=(60, 5)), rng.normal(size=60)
@@ -137,8 +148,9 @@ def test_unseen_errors_are_those_of_leaving_rows_out(world):
     for fold in np.array_split(np.arange(60), 4):
         rest = np.setdiff1d(np.arange(60), fold)
         error = y[fold] - X[fold] @ np.linalg.lstsq(X[rest], y[rest], rcond=None)[0]
-        total += float(np.sum((NU + 1.0) * np.log1p(error**2 / NU)))
-    assert _loss(Q, left, list(np.array_split(np.arange(60), 4))) == pytest.approx(total, rel=1e-6)
+        total += float(np.sum(error**2))
+    found = _unseen_squares(Q, left, np.array_split(np.arange(60), 4), np.zeros((60, 0)))
+    assert np.sum(found) == pytest.approx(total, rel=1e-6)
 
 
 def test_what_explains_little_beside_an_unknown_cause_is_no_final_name(world):
