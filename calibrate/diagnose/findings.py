@@ -72,9 +72,11 @@ def findings_of(
 
 
 def _sized(finding: Finding) -> bool:
-    """Whether any of its sizes is certain to be one: a name of nothing in particular is none."""
+    """Whether its size is certain to be one: a name of nothing in particular is none. Of several sizes, as of a move,
+    each may be vague and all together plain; those that the data do not determine say nothing either way.
+    """
     told = [size for name, size in finding.parameters.items() if not name.startswith(NO_SIZE)]
-    return not told or any(abs(size.value) >= SIGMAS * size.sigma for size in told)
+    return len(told) != 1 or not abs(told[0].value) < SIGMAS * told[0].sigma < np.inf
 
 
 def _unsure(at: Search, i: int, finding: Finding, predicts: Floats) -> Finding:
