@@ -1,7 +1,5 @@
 """Rivals, isolability, lack of fit, unrecorded drivers, proof, next poses."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -18,6 +16,7 @@ from calibrate.diagnose.rivals import confidences, rivals_of
 from calibrate.diagnose.search import search
 from calibrate.diagnose.stated_sizes import sizes_of
 from calibrate.diagnose.unrecorded import unrecorded
+from calibrate.effects.term import Size
 
 
 def sine(joint):
@@ -166,15 +165,20 @@ def test_no_confidence_exceeds_what_the_drawn_sessions_prove(world):
     assert 0.99 < found.findings[0].confidence <= 1.0 - 1.0 / 601
 
 
-def test_a_name_without_a_size_of_three_sigma_is_an_unknown_cause(world, monkeypatch):
+@pytest.mark.parametrize(
+    ("sizes", "is_a_name"),
+    [
+        ({"amplitude_rad": Size(59e-6, 23e-6)}, False),
+        ({"amplitude_rad": Size(59e-6, 19e-6)}, True),
+        ({"amplitude_rad": Size(59e-6, 23e-6), "phase_rad": Size(1.0, 0.1)}, False),  # where, not how much
+        ({"x_m": Size(7.2e-6, 3.3e-6), "y_m": Size(-6.5e-6, 3.1e-6)}, True),  # together they may be plain
+        ({"amplitude_rad": Size(59e-6, np.inf)}, True),  # not determined, and nothing is stated of it
+    ],
+)
+def test_a_name_of_one_size_below_three_sigma_is_an_unknown_cause(world, monkeypatch, sizes, is_a_name):
     rng = np.random.default_rng(1)
     found = search(world.session(rng, [(world.at_joint(2, sine(2)), 2.0)]), rng)
-    (sure,) = findings_of(found, [()], predicts(found.bench))
-    assert sure.name.physics != UNKNOWN
-
-    def vague_sizes(bench, i):
-        return {name: replace(size, sigma=0.4 * abs(size.value)) for name, size in sizes_of(bench, i).items()}
-
-    monkeypatch.setattr("calibrate.diagnose.findings.sizes_of", vague_sizes)
-    (vague,) = findings_of(found, [()], predicts(found.bench))
-    assert vague.name.physics == UNKNOWN
+    monkeypatch.setattr("calibrate.diagnose.findings.sizes_of", lambda bench, i: sizes)
+    (said,) = findings_of(found, [()], predicts(found.bench))
+    assert (said.name.physics != UNKNOWN) is is_a_name
+    assert is_a_name or [rival.name.physics for rival in said.rivals] == ["encoder-eccentricity"]
