@@ -73,7 +73,7 @@ def findings_of(
 
 def _sized(finding: Finding) -> bool:
     """Whether its size is certain to be one: a name of nothing in particular is none. Of several sizes, as of a move,
-    each may be vague and all together plain; those that the data do not determine say nothing either way.
+    each may be vague and all together plain; those that the data do not determine decide nothing.
     """
     told = [size for name, size in finding.parameters.items() if not name.startswith(NO_SIZE)]
     return len(told) != 1 or not abs(told[0].value) < SIGMAS * told[0].sigma < np.inf

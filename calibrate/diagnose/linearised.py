@@ -57,7 +57,7 @@ class Unseen:
 
 def tame(misfit: Floats, least: float) -> NDArray[np.bool_]:
     """(observation,) that are not wild by the spread of all (observation, k), `least` at least: a gross error no model
-    is to blame for. Where each would be wild, the spread tells nothing, and none is.
+    is to blame for. Where each would be wild, the spread shows nothing, and none is.
     """
     spread = max(float(np.median(np.abs(misfit))) / 0.6745, least)
     near = np.max(np.abs(misfit), axis=1) <= WILD * spread

@@ -238,7 +238,7 @@ class Conveyor:
 
     @staticmethod
     def place(*shift: float) -> Place:
-        return Place("part", HOME @ transform(shift), np.eye(4), lambda s_m: transform((0.0, s_m, 0.0)), "belt")
+        return Place("part", HOME @ transform(shift), np.eye(4), lambda s_m: transform((0.0, s_m, 0.0)))
 
 
 def test_the_hand_stays_with_its_belt_however_long_it_takes_to_grip() -> None:

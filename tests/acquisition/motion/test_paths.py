@@ -38,7 +38,7 @@ def place_at(shift, turn, tool, *, moving: bool, s0_m: float = 0.0) -> Place:
     wanted = SOLVER.flange(HOME_RAD) @ transform(0.12 * np.array(shift), 0.4 * np.array(turn)) @ T_flange_tool
     if not moving:
         return Place("fixed", wanted, T_flange_tool)
-    return Place("carried", inverse(coord(s0_m)) @ wanted, T_flange_tool, coord, "CONV")
+    return Place("carried", inverse(coord(s0_m)) @ wanted, T_flange_tool, coord)
 
 
 def belt_at(t_s: float) -> BeltState:

@@ -55,7 +55,7 @@ def test_a_belt_that_stops_dead_is_overshot_by_two_periods_of_its_way() -> None:
         moved[1, 3] += s_m
         return moved
 
-    place = Place("part", inverse(base) @ T, np.eye(4), coord, "CONV")
+    place = Place("part", inverse(base) @ T, np.eye(4), coord)
     clock = {"t_s": 0.0}
     stop_s = 2.0 + 1e-6  # just after the belt was read, and read as running
 
@@ -82,7 +82,7 @@ def test_a_belt_that_stops_dead_is_overshot_by_two_periods_of_its_way() -> None:
 def test_a_lag_of_the_arm_that_is_known_does_not_leave_it_behind_a_belt(lag_s: float, known: bool) -> None:
     T = SOLVER.flange(POSTURE_RAD)
     base = transform(T[:3, 3])
-    place = Place("part", inverse(base) @ T, np.eye(4), lambda s_m: transform((0.0, s_m, 0.0)) @ base, "CONV")
+    place = Place("part", inverse(base) @ T, np.eye(4), lambda s_m: transform((0.0, s_m, 0.0)) @ base)
     now = {"t_s": 0.0}
     path = Path(SOLVER, POSTURE_RAD, [Segment("on belt", By.LINE, place)], PACE)
     belt = lambda: BeltState(V_M_S * now["t_s"], V_M_S)  # noqa: E731
