@@ -80,10 +80,13 @@ def _sized(finding: Finding) -> bool:
 
 
 def _unsure(at: Search, i: int, finding: Finding, predicts: Floats) -> Finding:
-    """The unknown cause in the place of a name that is hardly likely, which stays among what it could be."""
-    found = unknown_cause(at, (i,), predicts)
-    own = RivalName(finding.name, finding.confidence, 0.0, refitted=True)
-    return replace(found, rivals=(own, *finding.rivals), variant=finding.variant)
+    """The unknown cause in the place of a name that is hardly likely, or of no certain size. The name stays among what
+    it could be; all names together are no more likely than not.
+    """
+    found, doubted = unknown_cause(at, (i,), predicts), finding.believed(NOT_FINAL)
+    rivals = (RivalName(doubted.name, doubted.confidence, 0.0, refitted=True), *doubted.rivals)
+    left = max(found.confidence - sum(rival.confidence for rival in rivals), 0.0)
+    return replace(found, confidence=left, rivals=rivals, variant=finding.variant)
 
 
 def bare_findings(at: Search) -> tuple[Finding, ...]:

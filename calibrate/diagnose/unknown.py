@@ -161,8 +161,8 @@ def _remaining(at: Search, least: float) -> Search | None:
 
 def _best_name(at: Search) -> float:
     """BIC that the best closed term would gain now: as long as a name may do, no curve is put in its place."""
-    menu = at.bench.menu
-    free = menu.of_terms(np.array([cause_of(term) not in at.causes for term in menu.terms], dtype=bool))
+    menu, taken = at.bench.menu, at.causes
+    free = menu.of_terms(np.array([cause_of(term) not in taken for term in menu.terms], dtype=bool))
     return float(np.max(at.bench.scores.gain, where=free, initial=0.0))
 
 

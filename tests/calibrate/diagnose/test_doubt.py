@@ -181,4 +181,5 @@ def test_a_name_of_one_size_below_three_sigma_is_an_unknown_cause(world, monkeyp
     monkeypatch.setattr("calibrate.diagnose.findings.sizes_of", lambda bench, i: sizes)
     (said,) = findings_of(found, [()], predicts(found.bench))
     assert (said.name.physics != UNKNOWN) is is_a_name
+    assert said.confidence + sum(rival.confidence for rival in said.rivals) <= 1.0
     assert is_a_name or [rival.name.physics for rival in said.rivals] == ["encoder-eccentricity"]
