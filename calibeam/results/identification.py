@@ -23,6 +23,7 @@ from calibrate.identification.identify import identify
 from calibrate.identification.record import record_of
 from calibrate.identification.result import Identification
 from calibrate.model_file import ModelFile, RigIdentity, write_model
+from calibrate.physics.predicting import as_fitted
 from calibrate.report.session_evidence import session_evidence
 from calibrate.report.session_verdict import session_verdict
 from calibrate.report.verdict import Verdict
@@ -87,7 +88,9 @@ def session_model(result: Identification, recording: Recording, planned: Planned
     told = Planned() if planned is None else planned
     arm_model = (told.plan.model or rig.arm.model).value
     identity, readings = RigIdentity(rig.name, rig_sha256(text), text), readings_sha256(recording.samples)
-    return msgspec.structs.replace(record_of(result, identity, arm_model, told.text), readings_sha256=readings)
+    model = msgspec.structs.replace(record_of(result, identity, arm_model, told.text), readings_sha256=readings)
+    left = [(i.name, i.rows[:, 0], i.misfit) for i in result.instruments if i.rows.shape[1] == 1]
+    return as_fitted(model, recording.samples, left)
 
 
 def write_session_model(

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from calibrate.diagnose.curve import unit
 from calibrate.diagnose.linearised import Accepted, State
 from calibrate.diagnose.score import Removed, Scores, orthonormal, removed, scores
-from calibrate.diagnose.visible import VISIBLE, Menu, Sight, beyond, blind, menu_of, sight_of
+from calibrate.diagnose.visible import RANK, VISIBLE, Menu, Sight, beyond, blind, menu_of, sight_of
 from calibrate.effects.form import at_joint
 from calibrate.effects.term import Term
 
@@ -123,7 +123,7 @@ class Bench:
     def geometry(self) -> Floats:
         """(row, rank) orthonormal: what is fitted, without the terms."""
         own = np.isin(self.state.rows.owner, range(len(self.state.accepted)))
-        return np.linalg.qr(self.state.rows.geometry[:, ~own])[0]
+        return orthonormal(self.state.rows.geometry[:, ~own], RANK)
 
     def _share(self, i: int) -> float:
         """Of the contribution itself: combinations that the data do not need do not count."""

@@ -31,7 +31,7 @@ from calibrate.diagnose.bench import Bench
 from calibrate.diagnose.diagnosis import Finding, Unexplained, Verdict
 from calibrate.diagnose.drifts import doubtful, suspects, untold
 from calibrate.diagnose.findings import bare_findings, findings_of
-from calibrate.diagnose.folds import REGIONS, blocks, regions, units
+from calibrate.diagnose.folds import FOLDS, REGIONS, blocks, regions, units
 from calibrate.diagnose.hidden_levers import TIME
 from calibrate.diagnose.lack_of_fit import LackOfFit, lack_of_fit
 from calibrate.diagnose.linearised import Accepted, State
@@ -59,7 +59,6 @@ Rivals = tuple[tuple[Rival, ...], ...]
 
 Floats = NDArray[np.float64]
 
-FOLDS = 5  # of blocks in time
 RIDGE = 1e-9  # keeps a direction that only one fold knows finite
 
 Ints = NDArray[np.intp]

@@ -9,7 +9,7 @@ from calibrate.diagnose.bench import Bench
 from calibrate.diagnose.growing import admissible
 from calibrate.diagnose.linearised import Accepted
 from calibrate.diagnose.score import gain_of, removed, scores
-from calibrate.diagnose.searching import BETTER, Key, Search, cause_of
+from calibrate.diagnose.searching import BETTER, Key, Search, taken
 
 Group = tuple[int, ...]
 
@@ -25,11 +25,10 @@ def swapped(at: Search) -> Search:
         for i, gone in enumerate(at.bench.gone):
             own = at.state.accepted[i].term.key
             worth = gain_of(gone, at.bench.sight)
-            taken = {cause_of(a.term) for j, a in enumerate(at.state.accepted) if j != i}
-            barred = taken | {new for old, new in refused if old == own} | {own}
+            barred = taken(at.bench, (i,)) | {new for old, new in refused if old == own} | {own}
             least = max(worth + BETTER, best[0] + worth if best else -np.inf)
             found = scores(at.bench.menu, gone)
-            proposed = admissible(at.bench, found, gone, least, frozenset(barred))
+            proposed = admissible(at.bench, found, gone, least, barred)
             if proposed is not None:
                 best = (proposed.gain - worth, i, proposed.accepted)
         if best is None:
@@ -53,8 +52,7 @@ def merged(at: Search) -> Search:
         for group in _groups(at):
             gone = removed(at.state, at.bench.sight, group)
             worth = gain_of(gone, at.bench.sight)
-            taken = {cause_of(a.term) for j, a in enumerate(at.state.accepted) if j not in group}
-            barred = frozenset(taken | {new for old, new in refused if old == group})
+            barred = taken(at.bench, group) | {new for old, new in refused if old == group}
             found = scores(at.bench.menu, gone)
             least = max(worth + BETTER, best[0] + worth if best else -np.inf)
             proposed = admissible(at.bench, found, gone, least, barred)

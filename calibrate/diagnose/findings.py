@@ -36,7 +36,7 @@ NOT_FINAL = 0.5  # of the confidence in a name that may be the rest of something
 ALIKE = 1e-6  # sine between what two names can make of the readings
 FAINT = 0.05  # a name that is less likely is none
 SIGMAS = 3.0  # of a size, for a name
-NO_SIZE = ("phase", "time", "period", "degree")  # words of parameters for where or when, not how much
+NO_SIZE = ("phase", "time", "period", "degree", "order")  # words of parameters for where or when, not how much
 UNPROVED = 1.0 / (DRAWS + 1)  # of sessions with nothing in them: so many were drawn, and more is not shown by them
 LEFTOVER = 0.1  # of what an unknown cause explains: a curve may leave so much of a law that it only resembles
 

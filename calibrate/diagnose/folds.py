@@ -12,7 +12,9 @@ Ints = NDArray[np.intp]
 
 SHARE = 0.2  # of the samples
 MOST = 3  # places that are left out in turn, the largest ones: each costs two refits
-BLOCKS = 50  # of a session in time
+FOLDS = 5  # of blocks in time
+BLOCKS = 10  # in time, of each fold
+IN_A_BLOCK = 3  # samples, in a small session: single ones would be half seen by their neighbours
 HALVINGS = 3  # of the workspace
 REGIONS = 2**HALVINGS
 FEWEST = 10  # samples of a place, and of anything that is left out
@@ -53,10 +55,12 @@ def places(drivers: Drivers) -> Ints:
 
 
 def blocks(drivers: Drivers) -> Ints:
-    """(sample,) number of its block in time; visits of one pose are where its first one is."""
+    """(sample,) number of its block in time, as many in each fold; visits of one pose are where its first one is."""
     rank = np.argsort(np.argsort(drivers.t_s, kind="stable"))
-    _, first, label = np.unique(units(drivers), return_index=True, return_inverse=True)
-    return np.asarray((rank * BLOCKS // max(len(rank), 1))[first][label])
+    _, label = np.unique(units(drivers), return_inverse=True)
+    first, count = np.full(len(rank), len(rank)), FOLDS * min(max(len(rank) // (FOLDS * IN_A_BLOCK), 1), BLOCKS)
+    np.minimum.at(first, label, rank)
+    return np.asarray(first[label] * count // max(len(rank), 1))
 
 
 def regions(drivers: Drivers) -> Ints:

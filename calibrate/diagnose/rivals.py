@@ -14,7 +14,7 @@ from calibrate.diagnose.causes import is_slow_cause
 from calibrate.diagnose.linearised import Accepted
 from calibrate.diagnose.proposals import proposals
 from calibrate.diagnose.score import Removed, gain_of, scores
-from calibrate.diagnose.searching import Key, cause_of
+from calibrate.diagnose.searching import Key, cause_of, taken
 from calibrate.effects.term import Term
 
 Floats = NDArray[np.float64]
@@ -49,7 +49,7 @@ def rivals_of(bench: Bench, i: int) -> tuple[Rival, ...]:
     """Of accepted term i: all candidates within 6 BIC, nearest first; sizes that no machine has, only if better."""
     gone, own = bench.gone[i], bench.state.accepted[i].term
     refits = REFITS if len(bench.state.accepted) <= FEW and bench.state.samples <= LARGE else 0
-    near = _near(bench, gone, gain_of(gone, bench.sight), frozenset(cause_of(a.term) for a in bench.state.accepted))
+    near = _near(bench, gone, gain_of(gone, bench.sight), taken(bench, (i,)) | {cause_of(own)})
     found = [_confirmed(bench, i, r) if rank < refits or r.margin < 0.0 else r for rank, r in enumerate(near)]
     known = [r for r in found if r is not None and r.term.key != own.key]
     kept = [r for r in known if r.margin - _clock_price(bench, own, r.term) <= WITHIN]

@@ -1,16 +1,21 @@
 """The state of a search: a model on the bench, and what refits have shown so far."""
 
+from collections.abc import Collection
 from dataclasses import dataclass, field, replace
 
+import numpy as np
 from numpy.random import Generator
 
 from calibrate.diagnose.bench import Bench
+from calibrate.diagnose.curve import Curve
 from calibrate.diagnose.linearised import State
 from calibrate.diagnose.noise_law import noise_law
 from calibrate.diagnose.null import Null, null_of
 from calibrate.diagnose.visible import Menu
+from calibrate.effects.form import Form
+from calibrate.effects.ports import Place
 from calibrate.effects.second_encoders import placed
-from calibrate.effects.term import Term
+from calibrate.effects.term import Shape, Term
 
 Key = tuple[object, ...]
 
@@ -21,6 +26,7 @@ ALPHA_FURTHER = 0.01
 SURE, SURE_SLOW = 60.0, 150.0
 BETTER = 0.5  # of BIC, for an exchange
 HELD = 2  # harmonics of a turn that a smooth curve over a part of it can be
+SMOOTH = (Shape.LINEAR, Shape.QUADRATIC, Shape.CUBIC, Shape.HARMONIC)  # a step, a sign or a decay is no smooth curve
 PLACE = "place"  # what variants that name one begin with
 
 
@@ -44,22 +50,38 @@ class Search:
     @property
     def causes(self) -> frozenset[Key]:
         """Of the accepted terms, one term for one cause, whatever its variant; and what their curves hold already."""
-        own = frozenset(cause_of(a.term) for a in self.state.accepted)
-        curves = [a.term for a in self.state.accepted]
-        return own | frozenset(cause_of(t) for t in self.bench.menu.terms if any(holds(curve, t) for curve in curves))
+        return taken(self.bench, ())
 
     def at(self, bench: Bench) -> "Search":
         """Banned terms have another chance as soon as the model is another."""
         return replace(self, bench=bench, banned=frozenset())
 
 
+def taken(bench: Bench, gone: Collection[int]) -> frozenset[Key]:
+    """Causes of the accepted terms but those in `gone`, and keys of what their curves hold already."""
+    terms = [a.term for i, a in enumerate(bench.state.accepted) if i not in gone]
+    curves = [term for term in terms if isinstance(term, Curve)]
+    held = (t.key for t in bench.menu.terms if any(holds(curve, t) for curve in curves)) if curves else ()
+    return frozenset(map(cause_of, terms)) | frozenset(held)
+
+
 def holds(curve: Term, term: Term) -> bool:
     """Whether a smooth curve can be all that a term of the same place is: side by side they would balance each other
     where rows are, and part where there is none.
     """
-    smooth = curve.open and not curve.variant  # variants are of one shape: a bump, a period
-    within = curve.port.where == term.port.where and set(term.depends_on) <= set(curve.depends_on)
-    return smooth and within and (term.order or 1) <= HELD
+    if not isinstance(curve, Curve) or not set(term.depends_on) <= set(curve.depends_on):
+        return False
+    slow = term.shape in SMOOTH and (term.order or 1) <= HELD
+    return slow and curve.port == term.port and _within(curve, term)
+
+
+def _within(curve: Curve, term: Term) -> bool:
+    """Whether a term of the same port acts through the component of the curve alone."""
+    if curve.port.place is Place.JOINTS:
+        return True
+    if not isinstance(term, Form) or term.directions is None:
+        return False
+    return set(np.flatnonzero(np.any(term.directions != 0.0, axis=1)).tolist()) == {curve.component}
 
 
 def cause_of(term: Term) -> Key:

@@ -85,7 +85,8 @@ def _cases(at: Search, families: Families, given_up: frozenset[Keys]) -> list[Ca
 def _without_names(at: Search, case: Case) -> Search:
     group = tuple(i for i, a in enumerate(at.state.accepted) if a.term.key in case.keys)
     new = fitted_curve(at.bench, case.offer, removed(at.state, at.bench.sight, group))
-    kept = [a for i, a in enumerate(at.state.accepted) if i not in group and a.term.key != new.term.key]
+    rest = [a for i, a in enumerate(at.state.accepted) if i not in group and a.term.key != new.term.key]
+    kept = [a for a in rest if not _balance(new.term, a.term)]
     return _with(at, [*kept, new], {new.term.key: min(at.p.get(key, 0.0) for key in case.keys)})
 
 
@@ -168,14 +169,13 @@ def _best_name(at: Search) -> float:
 
 def _beside(accepted: Sequence[Term]) -> Allowed:
     """What is not one more function of the same drivers at the same place: two of those balance each other."""
-    taken = [(_spot(term), set(term.depends_on)) for term in accepted if term.open]
+    return lambda term: not any(_balance(term, other) for other in accepted)
 
-    def allowed(term: Term) -> bool:
-        own, drivers = _spot(term), set(term.depends_on)
-        twice = any(spot == own and (drivers <= other or other <= drivers) for spot, other in taken)
-        return not (twice or any(holds(term, other) for other in accepted))
 
-    return allowed
+def _balance(new: Term, other: Term) -> bool:
+    """Whether a curve and an accepted term would balance each other."""
+    one, two = set(new.depends_on), set(other.depends_on)
+    return holds(new, other) or (other.open and _spot(new) == _spot(other) and (one <= two or two <= one))
 
 
 def _spot(term: Term) -> tuple[str, int]:

@@ -1,6 +1,6 @@
 """A diagnosis as model.json, schema 2: geometry refitted together with the effects that were found."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from importlib.metadata import version
 from typing import Any
@@ -52,6 +52,7 @@ from calibrate.model_file import (
 from calibrate.parameters import Parameter, plausible_sizes, priors, without_assumed
 from calibrate.physics.acting import drivers_under, listed, range_of
 from calibrate.physics.applied import kept_conditions, needed_columns, recorded_conditions
+from calibrate.physics.predicting import as_fitted
 from calibrate.physics.records import Effect, EffectCurve, EffectParameter, SessionRecord
 from calibrate.predict import Predictor
 from calibrate.problem import whitener_of
@@ -62,6 +63,7 @@ from calibrate.variance import TOLD, VarianceFactors
 from calibrate.weighting import JOINT, Weighting
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.intp]
 
 SOFTWARE = f"calibeam {version('calibeam')}"
 CUT = 0.99
@@ -137,7 +139,15 @@ def model_of_fit(
             conditions={c: tuple(map(_number, v.tolist())) for c, v in conditions.items()},
         ),
     )
-    return _as_listed(model, fit, parameters, covariance, conditions)
+    model = _as_listed(model, fit, parameters, covariance, conditions)
+    return as_fitted(model, fit.session.samples, list(_misfits(fit)))
+
+
+def _misfits(fit: Fitted) -> Iterator[tuple[str, Ints, Floats]]:
+    """Of each instrument whose readings follow one sample each: name, samples (reading,), observed less expected."""
+    for i, (m, rows) in enumerate(zip(fit.session.measured, fit.problem.rows, strict=True)):
+        if m.sample_rows.shape[1] == 1:
+            yield m.name, m.sample_rows[rows, 0], m.problem.observed[rows] - fit.around.expected[i][rows]
 
 
 def _status(fit: Fitted, seen: Identifiability) -> Status:

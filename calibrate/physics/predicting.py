@@ -14,7 +14,9 @@ predicted error over the workspace (uncertainty/free_space.py) such a motion of 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
+import msgspec
 import numpy as np
+from msgspec import structs
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
@@ -22,13 +24,16 @@ from acquisition.recording import Samples
 from calibrate.arms.serial import SerialArm
 from calibrate.diagnose.ported import offsets, perturbed_frames
 from calibrate.effects.ports import Perturbation, Port
+from calibrate.errors import DataError
 from calibrate.model_file import ModelFile
 from calibrate.physics.acting import Acting, arm_in, flange_frames, moved_columns
 from calibrate.physics.applied import Applied, effects_at
 from calibrate.predict import Columns, Predictor, less_cones, readings, residuals
 from calibrate.rigid import cross_matrix, inverse, transform
+from calibrate.sensors.catalogue import kind_of
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.intp]
 
 POSTURES = 500  # the motion that lies best settles to about 2 %
 SEED = 1  # of the postures: the same model always has the same frame
@@ -89,6 +94,8 @@ def mean_motion(T_from: Floats, T_to: Floats) -> Floats:
 At = Callable[[Predictor, Perturbation], Columns]
 
 PLACED = ("x", "y", "z", "about_x", "about_y", "about_z", "tip_x", "tip_y", "tip_z")
+DIFFERS = 0.02  # of the rms that a fit leaves: more is no rounding of a file
+ROUNDING = 1e-9  # m or rad: exact readings leave next to nothing
 STEP = 1e-6  # m, rad or a factor: readings are linear over it, and 1e-10 of a derivative is lost to rounding
 
 
@@ -109,6 +116,33 @@ def predict_with_physics(model: ModelFile, samples: Samples, same_session: bool 
     predictor = Predictor.of(model)
     applied = effects_at(model, predictor, samples, same_session)
     return Predicted(_with_sigma(model, predictor, samples, applied), applied.outside, applied.notes)
+
+
+def as_fitted(model: ModelFile, samples: Samples, misfits: Sequence[tuple[str, Ints, Floats]]) -> ModelFile:
+    """The model, if its file predicts the session that it was fitted to as the fit does.
+
+    `misfits` of each instrument: its name, rows of `samples` (reading,) and what the fit leaves there (reading, k).
+    DataError where the rms of an instrument differs: an error of this program, and no model is better than such a one.
+    """
+    file = msgspec.json.decode(msgspec.json.encode(structs.replace(model, covariance=None)), type=ModelFile)
+    columns = predict_with_physics(file, samples, same_session=True).columns
+    for name, rows, misfit in misfits:
+        reads = kind_of(name).reads
+        read = [columns[f"r_{c}"][rows] for c in reads if f"r_{c}" in columns]
+        if len(read) != misfit.shape[1]:
+            continue  # such readings have no columns in a prediction
+        part = kind_of(name).quantities[0].part  # a turn is no difference of columns
+        fitted, predicted = _rms(misfit[:, part]), _rms(np.stack(read, axis=1)[:, part])
+        if not abs(predicted - fitted) <= DIFFERS * fitted + ROUNDING:
+            raise DataError(
+                f"no model: read from its file it would leave {predicted:.3g} of {name} in its own session, and the "
+                f"fit leaves {fitted:.3g}; please report it with the recording"
+            )
+    return model
+
+
+def _rms(values: Floats) -> float:
+    return float(np.sqrt(np.mean(values**2)))
 
 
 def _with_sigma(model: ModelFile, predictor: Predictor, samples: Samples, applied: Applied) -> Columns:

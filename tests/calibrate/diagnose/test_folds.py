@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from calibrate.diagnose.folds import FEWEST, blocks, regions, splits_of, units
+from calibrate.diagnose.folds import FEWEST, FOLDS, blocks, regions, splits_of, units
 
 
 def random_split(world, samples):
@@ -57,3 +57,21 @@ def test_a_block_is_of_neighbours_in_time_and_a_region_of_neighbours_in_space(wo
         assert np.ptp(order[block == one]) < n / 25
     for one in range(8):
         assert np.ptp(x[region == one]) < 0.3
+
+
+@pytest.mark.parametrize("samples", [20, 31, 60, 150])
+def test_folds_of_blocks_in_time_are_of_one_size_however_few_samples(world, samples):
+    drivers = world.session(np.random.default_rng(4)).drivers
+    drivers = replace(drivers, t_s=drivers.t_s[:samples], repeat=None)
+    block = blocks(drivers)
+    assert np.ptp(np.bincount(block % FOLDS)) <= FOLDS
+    assert np.bincount(block).min() >= 3  # a single one is half seen by its neighbours
+
+
+def test_a_pose_that_is_visited_again_belongs_to_the_block_of_its_first_visit(world):
+    drivers = world.session(np.random.default_rng(4)).drivers
+    n = len(drivers.t_s)
+    repeat = np.full(n, -1)
+    repeat[[3, n - 1]] = 0
+    backwards = replace(drivers, repeat=repeat, t_s=drivers.t_s.max() - drivers.t_s)
+    assert blocks(backwards)[3] == blocks(backwards)[n - 1] == blocks(replace(backwards, repeat=None))[n - 1]

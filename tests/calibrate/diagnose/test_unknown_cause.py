@@ -16,6 +16,9 @@ from calibrate.diagnose.score import removed
 from calibrate.diagnose.search import search
 from calibrate.diagnose.searching import holds
 from calibrate.diagnose.unknown import cancel, with_unknowns
+from calibrate.effects.form import Form
+from calibrate.effects.ports import Place, Port
+from calibrate.effects.term import Shape
 
 SIZE_RAD = 1.5
 
@@ -114,6 +117,29 @@ def test_a_curve_holds_slow_harmonics_of_its_own_joint_only(world):
     assert held
     assert all(t in at_joint_2 and (t.order or 1) <= 2 for t in held)
     assert not any(holds(t, at_joint_2[0]) for t in terms)  # a name holds no other
+
+
+def law(port, shape, driver, component=0, order=None):
+    """One piece of physics along one direction of a port, six of a frame."""
+    along = np.eye(6)[:, [component]]
+    about = {"names": ("size_rad",), "limit": 1.0, "sentence": "", "directions": along}
+    return Form(port, (driver,), shape, "some physics", order, function=lambda drivers, inner: drivers.q_rad, **about)
+
+
+def test_a_curve_holds_no_step_and_nothing_behind_both_encoders():
+    angle = Port("joint2.angle", Place.JOINTS)
+    slow = law(angle, Shape.LINEAR, "t")
+    assert holds(curve(angle, 1, ("t",), 4), slow)
+    assert not holds(curve(angle, 1, ("t",), 4), law(angle, Shape.STEP, "t"))
+    assert not holds(curve(replace(angle, past_encoders=True), 1, ("t",), 4), slow)
+
+
+def test_a_curve_along_one_direction_of_a_link_holds_nothing_along_another():
+    link = Port("link2.offset", Place.FRAME, 2)
+    bent = law(link, Shape.HARMONIC, "q1", component=4, order=1)
+    assert holds(curve(link, 4, ("q1", "q2"), 4), bent)
+    assert not holds(curve(link, 3, ("q1", "q2"), 4), bent)
+    assert not holds(curve(replace(link, index=3), 4, ("q1", "q2"), 4), bent)
 
 
 def test_curves_of_which_geometry_leaves_nothing_explain_nothing(world):
