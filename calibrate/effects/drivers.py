@@ -60,7 +60,6 @@ def conditions_of(samples: Samples, temperatures_degC: Mapping[str, Floats]) -> 
     n, q = samples.n_joints, samples.joints()
     moves, direction = moves_of(samples)
     recorded = _per_joint(samples, "approach", "", n)
-    commanded = samples.commanded()
     return Conditions(
         q_rad=q,
         t_s=samples.column("t_s"),
@@ -68,7 +67,7 @@ def conditions_of(samples: Samples, temperatures_degC: Mapping[str, Floats]) -> 
         approach_derived=recorded is None,
         last_move_rad=moves,
         qd_rad_s=_per_joint(samples, "qd", "_rad_s", n),
-        cmd_minus_q_rad=None if commanded is None or np.isnan(commanded).all() else np.nan_to_num(commanded - q),
+        cmd_minus_q_rad=_per_joint(samples, "cmd", "_rad", n, q),
         temperatures_degC=temperatures_degC,
         payload_kg=np.nan_to_num(samples.column("payload_kg")) if _recorded(samples, "payload_kg") else None,
         payload_com_m=_stacked(samples, ("payload_com_x_m", "payload_com_y_m", "payload_com_z_m")),
@@ -102,13 +101,16 @@ def uncoupled_samples(arm: Arm, samples: Samples) -> Samples:
     return Samples(columns, n)
 
 
-def _per_joint(samples: Samples, stem: str, unit: str, n: int) -> Floats | None:
-    """(sample, joint); None where no joint has the column, zero for a joint that lacks it."""
+def _per_joint(samples: Samples, stem: str, unit: str, n: int, less: Floats | None = None) -> Floats | None:
+    """(sample, joint), less what is given of each; None where no joint has the column, zero for one that lacks it: a
+    model keeps the columns of those joints alone that its effects need.
+    """
     names = per_joint(stem, unit, n)
     if not any(_recorded(samples, name) for name in names):
         return None
-    zero = np.zeros(len(samples))
-    return np.stack([np.nan_to_num(samples.column(c)) if c in samples else zero for c in names], axis=1)
+    unrecorded = np.full(len(samples), np.nan)
+    values = np.stack([samples.column(c) if c in samples else unrecorded for c in names], axis=1)
+    return np.nan_to_num(values if less is None else values - less)
 
 
 def moves_of(samples: Samples) -> tuple[Floats, Floats]:

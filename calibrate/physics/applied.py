@@ -32,7 +32,7 @@ from calibrate.weighting import Measured, Weighting
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
-USED_AS = ("placement", "first_psd", SEAT)  # how the instrument stood: without it a row has no reading to predict
+USED_AS = ("placement", "first_psd", SEAT, "target")  # of the instrument or the tool: else a row has another reading
 BY_JOINT = {
     "approach": "approach{}",
     "last_move": "last_move{}_rad",
