@@ -100,6 +100,7 @@ def _free_space_line(label: str, cases: Sequence[CaseScore]) -> FreeSpaceLine:
 
 
 BINS = (0.0, 0.15, 0.3, 0.6, 1.0, 2.0, 5.0, np.inf)  # effect over noise
+CONFIDENCES = (0.3, 0.5, 0.8, 0.95, np.inf)
 SINGLE = ("one", "disturbed")
 NONE = "-"  # no case of that kind
 
@@ -199,6 +200,7 @@ def figures(cases: Sequence[CaseScore]) -> list[ProofFigure]:
     return [
         *out,
         ProofFigure("faint (0.15 - 0.3): what is named is right", str(share(s.right for s in faint)), "all"),
+        *_calibration(cases),
         ProofFigure("outside: place right", str(share(c.defects[0].located for c in outside)), ">= 90 %"),
         ProofFigure("outside: reported as unknown", str(share(_said_unknown(c) for c in outside)), ">= 90 %"),
         ProofFigure("outside: misnamed with confidence", str(share(c.misnamed for c in outside)), "<= 5 %"),
@@ -212,6 +214,16 @@ def figures(cases: Sequence[CaseScore]) -> list[ProofFigure]:
         ProofFigure("diagnoses that failed", str(share(c.verdict == "failed" for c in cases)), "none"),
         *_ratios(cases),
     ]
+
+
+def _calibration(cases: Sequence[CaseScore]) -> Iterable[ProofFigure]:
+    """Whether a confidence is a share of names that are right."""
+    names = [s for c in cases for s in c.said if s.physics != UNKNOWN]
+    for low, high in pairwise(CONFIDENCES):
+        mine = [s for s in names if low <= s.confidence < high]
+        mean = f"{100.0 * float(np.mean([s.confidence for s in mine])):.0f}{NO_BREAK}%" if mine else NONE
+        label = f"names of confidence {low:g} to {min(high, 1.0):g}: right"
+        yield ProofFigure(label, str(share(s.right for s in mine)), f"as stated: {mean}")
 
 
 def _ratios(cases: Sequence[CaseScore]) -> Iterable[ProofFigure]:

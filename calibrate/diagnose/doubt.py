@@ -28,9 +28,10 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 
 from calibrate.diagnose.bench import Bench
-from calibrate.diagnose.diagnosis import Finding, Unexplained, Verdict
-from calibrate.diagnose.drifts import doubtful, suspects, untold
-from calibrate.diagnose.findings import bare_findings, findings_of
+from calibrate.diagnose.diagnosis import UNKNOWN, Finding, Unexplained, Verdict
+from calibrate.diagnose.drifts import suspects
+from calibrate.diagnose.drifts import untold as drift_untold
+from calibrate.diagnose.findings import bare_findings, findings_of, named
 from calibrate.diagnose.folds import FOLDS, REGIONS, blocks, regions, units
 from calibrate.diagnose.hidden_levers import TIME
 from calibrate.diagnose.lack_of_fit import LackOfFit, lack_of_fit
@@ -104,19 +105,23 @@ def doubted(
     misfit = stages.attempt(Stage.REPEATS, lambda: lack_of_fit(at.bench), None)
     lasting = stages.attempt(Stage.TIME, lambda: time_left(at.bench, rng), None)
     speed = [m for m in missing if m.driver == SPEED]
-    moving = _moving(at, speed)
+    lagging = _lagging(at) if speed else []
+    moving = _moving(at, speed, lagging)
     left = [*_scattered(scatter), *_repeated(misfit), *_lasting(lasting), *moving]
     final = not left and not stages.undecided
+    drifting = {i: hidden for i, a in enumerate(at.state.accepted) if (hidden := suspects(named(a.term), missing))}
+    would = {scatter.port.where} if scatter is not None and scatter.missing else set[str]()
+    untold = {*drifting, *lagging, *(i for i, a in enumerate(at.state.accepted) if a.term.port.where in would)}
     findings = stages.attempt(
-        Stage.SIZES, lambda: findings_of(at, rivals, predicts(at.bench), final), bare_findings(at)
+        Stage.SIZES, lambda: findings_of(at, rivals, predicts(at.bench), final, untold), bare_findings(at)
     )
-    drifts = [(f, hidden) for f in findings if (hidden := suspects(f, missing))]
-    findings = tuple(doubtful(f) if suspects(f, missing) else f for f in findings)
+    where = {at.state.accepted[i].term.port.where: hidden for i, hidden in drifting.items()}
+    drifts = [(f, where[f.name.where]) for f in findings if f.name.where in where and f.name.physics == UNKNOWN]
     lacking = [*(scatter.missing if scatter is not None else ()), *(speed if moving else ())]
     lacking += [m for _, hidden in drifts for m in hidden]
     if left and not lacking:
         lacking = list(missing)
-    unexplained = (*left, *(untold(f, hidden) for f, hidden in drifts))
+    unexplained = (*left, *(drift_untold(f, hidden) for f, hidden in drifts))
     return Doubted(at, findings, unexplained, misfit, records(lacking), stages.undecided)
 
 
@@ -157,10 +162,17 @@ def _scattered(found: Unrecorded | None) -> list[Unexplained]:
     return [Unexplained(found.port.where, drivers, found.share, found.p, why)]
 
 
-def _moving(at: Search, speed: Sequence[Missing]) -> list[Unexplained]:
-    """Several joints that lag by the way they came: slack in each, or one clock that is late while all move."""
+def _lagging(at: Search) -> list[int]:
+    """Terms by which several joints lag by the way they came: slack in each, or one clock that is late while all move;
+    none where few do.
+    """
     lagging = [i for i, a in enumerate(at.state.accepted) if a.term.depends_on[0].startswith(MOTION)]
-    if not speed or len({at.state.accepted[i].term.port.where for i in lagging}) < SEVERAL:
+    return lagging if len({at.state.accepted[i].term.port.where for i in lagging}) >= SEVERAL else []
+
+
+def _moving(at: Search, speed: Sequence[Missing], lagging: Sequence[int]) -> list[Unexplained]:
+    """What only the speed of the joints would show of `lagging` terms."""
+    if not lagging:
         return []
     lost = sum(at.bench.gone[i].squares for i in lagging)
     share = lost / (lost + at.bench.sight.rss)

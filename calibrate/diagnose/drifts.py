@@ -16,9 +16,8 @@ ROOM = "temp_room_degC"
 NOT_FINAL = 0.5  # confidence in the name of a drift that something else might explain
 
 
-def suspects(finding: Finding, missing: Sequence[Missing]) -> tuple[Missing, ...]:
-    """Columns, not in the record, that a finding may really follow; none for what does not drift."""
-    name = finding.name
+def suspects(name: Named, missing: Sequence[Missing]) -> tuple[Missing, ...]:
+    """Columns, not in the record, that a cause may really follow; none for what does not drift."""
     out: list[Missing] = []
     if name.depends_on == ("t",) and name.shape in SMOOTH:
         out += _thermometers(name.where, [m for m in missing if m.driver == WARMTH])

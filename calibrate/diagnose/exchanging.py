@@ -8,6 +8,7 @@ import numpy as np
 from calibrate.diagnose.bench import Bench
 from calibrate.diagnose.growing import admissible
 from calibrate.diagnose.linearised import Accepted
+from calibrate.diagnose.null import is_slow
 from calibrate.diagnose.score import gain_of, removed, scores
 from calibrate.diagnose.searching import BETTER, Key, Search, taken
 
@@ -71,10 +72,13 @@ def merged(at: Search) -> Search:
 
 
 def _groups(at: Search) -> list[Group]:
-    """Accepted terms that one other might stand for: of a port, of a driver, of a physics; and all pairs of few."""
+    """Accepted terms that one other might stand for: of a port, of a driver or one kind of it (many that change with
+    time are one warm-up, many bends one soft joint), of a physics; and all pairs of few.
+    """
     terms = [a.term for a in at.state.accepted]
     found: set[Group] = set()
-    for labels in ([t.port.where for t in terms], [t.depends_on for t in terms], [t.physics for t in terms]):
+    kinds = ["t" if is_slow(t) else t.depends_on[0].rstrip("0123456789") for t in terms]
+    for labels in ([t.port.where for t in terms], [t.depends_on for t in terms], kinds, [t.physics for t in terms]):
         found |= {tuple(i for i, other in enumerate(labels) if other == label) for label in labels}
     if len(terms) <= PAIRED:
         found |= set(combinations(range(len(terms)), 2)) | {tuple(range(len(terms)))}

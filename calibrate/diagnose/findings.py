@@ -10,7 +10,7 @@ coefficients are shared out between it, its neighbours and geometry as priors pl
 What only the curve explains is one: felt at the readings, divided by how they feel the port.
 """
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -50,12 +50,17 @@ def named(term: Term) -> Named:
 
 
 def findings_of(
-    at: Search, rivals: Sequence[Sequence[Rival]], predicts: Floats, final: bool = True
+    at: Search,
+    rivals: Sequence[Sequence[Rival]],
+    predicts: Floats,
+    final: bool = True,
+    untold: Collection[int] = (),
 ) -> tuple[Finding, ...]:
     """Largest first. `rivals` of each term; `predicts` (term,) as `calibrate/diagnose/doubt.py` gives it.
 
     All that is unknown at one port is one finding. `final`: no structure is left without a name; while some is, no
-    name of physics is more likely than not.
+    name of physics is more likely than not. `untold`: terms that a column which was not recorded would explain; their
+    names are alternatives only.
     """
     accepted = at.state.accepted
     unnamed = _unnamed(at)
@@ -64,7 +69,7 @@ def findings_of(
     names = [_finding(at, i, rivals[i], float(predicts[i])) for i in closed]
     unknown = [unknown_cause(at, group, predicts) for group in unnamed]
     names = [f if final and _final(f, unknown) else f.believed(NOT_FINAL) for f in names]
-    sure = [f.confidence >= FAINT and _sized(f) for f in names]
+    sure = [i not in untold and f.confidence >= FAINT and _sized(f) for i, f in zip(closed, names, strict=True)]
     names = [f if ok else _unsure(at, i, f, predicts) for i, f, ok in zip(closed, names, sure, strict=True)]
     explained = max(sum(f.share for f in (*names, *unknown)), 1e-300)
     found = [replace(f, share=f.share / explained) for f in (*_no_leftovers(names, unknown), *unknown)]

@@ -15,7 +15,7 @@ import numpy as np
 from calibrate.diagnose.bench import Bench
 from calibrate.diagnose.curve import Curve
 from calibrate.diagnose.linearised import Accepted
-from calibrate.diagnose.noise_law import noise_law
+from calibrate.diagnose.noise_law import NoiseLaw, noise_law
 from calibrate.diagnose.null import is_slow
 from calibrate.diagnose.open_families import Allowed, Families, Offer, anything, fitted_curve, open_families
 from calibrate.diagnose.pruning import CANCELS
@@ -27,6 +27,7 @@ from calibrate.effects.ports import Place
 from calibrate.effects.term import Term
 
 DRAWS = 120
+ROOM, ALPHA_ROOM = "temp_room", 1e-4  # of a joint that seems to follow the room
 FORBIDS = 10.0  # BIC by which an open family beats the best name
 ROUNDS = 6
 CURVES = 4  # in a row without a name between them, before the search goes on
@@ -136,24 +137,39 @@ def _filled(at: Search, grown: bool) -> Search:
     return at
 
 
+def _follows_room(term: Term) -> bool:
+    """A joint's angle and the room's temperature: no part of a joint does, and what seems to is chance or a drift."""
+    return term.port.place is Place.JOINTS and ROOM in term.depends_on
+
+
+def _p_of(at: Search, families: Families, law: NoiseLaw, offer: Offer, allowed: Allowed) -> float:
+    """That noise alone makes any open term that is allowed seem so good."""
+    if offer.gain >= SURE:
+        return 0.0
+    noise = law.draw(at.rng, DRAWS)
+    left = noise - at.bench.sight.basis @ (at.bench.sight.basis.T @ noise)
+    return Tail(families.maxima(left, allowed)).p(offer.gain)
+
+
 def _remaining(at: Search, least: float) -> Search | None:
     """With the best open term of more than the `least` gain."""
     families = open_families(at.bench)
     law = noise_law(at.state.rows, at.bench.sight, at.state.drivers.t_s, at.rng)
     free = _beside([a.term for a in at.state.accepted])
 
-    def asked(term: Term) -> bool:
+    def allowed(term: Term) -> bool:
         return free(term) and not (law.wanders and is_slow(term))
 
-    offer = families.best(None, asked, least)
-    if offer is None:
-        return None
-    p = 0.0
-    if offer.gain < SURE:
-        noise = law.draw(at.rng, DRAWS)
-        left = noise - at.bench.sight.basis @ (at.bench.sight.basis.T @ noise)
-        p = Tail(families.maxima(left, asked)).p(offer.gain)
-    if p > ALPHA_FURTHER:
+    offer = families.best(None, allowed, least)
+    p = 1.0 if offer is None else _p_of(at, families, law, offer, allowed)
+    if offer is not None and _follows_room(offer.term) and p > ALPHA_ROOM:
+
+        def elsewhere(term: Term) -> bool:
+            return allowed(term) and not _follows_room(term)
+
+        offer = families.best(None, elsewhere, least)
+        p = 1.0 if offer is None else _p_of(at, families, law, offer, elsewhere)
+    if offer is None or p > ALPHA_FURTHER:
         return None
     new = fitted_curve(at.bench, offer, None)
     trial = _with(at, [*at.state.accepted, new], {new.term.key: p})

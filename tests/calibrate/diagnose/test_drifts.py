@@ -18,7 +18,7 @@ def found(where, physics, shape="exponential", depends_on=("t",)):
 
 
 def columns(finding, missing):
-    return tuple(m.column for m in suspects(finding, missing))
+    return tuple(m.column for m in suspects(finding.name, missing))
 
 
 def test_a_drift_may_follow_a_temperature_that_was_not_recorded():
@@ -62,4 +62,4 @@ def test_an_unknown_drift_stays_as_sure_as_it_was_and_may_be_a_load():
 def test_the_thermometer_that_would_tell_is_named_with_its_column(where, told):
     drift = found(where, "unknown", "smooth")
     assert columns(drift, WARMTH) == told
-    assert all(column in untold(drift, suspects(drift, WARMTH)).why for column in told)
+    assert all(column in untold(drift, suspects(drift.name, WARMTH)).why for column in told)
