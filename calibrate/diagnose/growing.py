@@ -14,6 +14,7 @@ from calibrate.diagnose.searching import (
     ALPHA_DRIFT,
     ALPHA_FIRST,
     ALPHA_FURTHER,
+    FEW_DRAWS,
     SURE,
     SURE_SLOW,
     Key,
@@ -53,7 +54,7 @@ def grown(at: Search) -> Search | None:
         entry, coarse = proposed.entry, float(found.gain[proposed.entry])  # the null knows the grid, no finer values
         p = 0.0
         if coarse < _sure(proposed.term):
-            null = null_at(at.bench, at.rng) if null is None else null
+            null = null_at(at.bench, at.rng, FEW_DRAWS) if null is None else null
             p = _p_of(at.bench, proposed, null, coarse)
         if p > _alpha(at, null, bool(slow[entry])):
             # The other family has its own null: a wander that hides a drift need not hide a harmonic.

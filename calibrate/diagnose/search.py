@@ -18,7 +18,7 @@ from calibrate.diagnose.growing import admissible, grown
 from calibrate.diagnose.linearised import State
 from calibrate.diagnose.pruning import confirmed, p_of, tidied
 from calibrate.diagnose.score import gain_of
-from calibrate.diagnose.searching import BETTER, SURE_SLOW, Key, Search, null_at
+from calibrate.diagnose.searching import BETTER, FEW_DRAWS, SURE_SLOW, Key, Search, null_at
 from calibrate.effects.term import Shape
 from calibrate.effects.time_laws import FEWEST_AFTER
 
@@ -27,11 +27,16 @@ MOST = 30  # terms; beyond it the model form is wrong, not incomplete
 
 def search(state: State, rng: Generator) -> Search:
     """All closed terms that beat the null of the whole catalogue, in a model in which each one is needed."""
-    return grown_out(Search(Bench(state), rng))
+    return settled(grown_out(Search(Bench(state), rng)))
+
+
+def settled(at: Search) -> Search:
+    """Each term confirmed by draws: a search goes on from sure ones without."""
+    return tidied(confirmed(at))
 
 
 def grown_out(at: Search) -> Search:
-    """Grown, swapped and pruned until nothing changes, then each term confirmed."""
+    """Grown, swapped and pruned until nothing changes."""
     at = tidied(swapped(at))
     vain: frozenset[Key] = frozenset()  # added, and gone again when the others had found their places
     for _ in range(MOST):
@@ -47,7 +52,7 @@ def grown_out(at: Search) -> Search:
             vain |= added
         else:
             break
-    return tidied(confirmed(at))
+    return at
 
 
 def unswallowed(at: Search) -> Search | None:
@@ -67,5 +72,5 @@ def unswallowed(at: Search) -> Search | None:
     # Picked for its outlying rows, so the null, which has none, is no judge: heavy tails make such steps, too.
     if gain_of(trial.gone[-1], trial.sight) < SURE_SLOW:
         return None
-    p = p_of(trial, null_at(trial, at.rng), len(trial.state.accepted) - 1)
+    p = p_of(trial, null_at(trial, at.rng, FEW_DRAWS), len(trial.state.accepted) - 1)
     return replace(at.at(trial), p=at.p | {proposed.term.key: p})

@@ -10,8 +10,7 @@ from calibrate.diagnose.bench import Bench
 from calibrate.diagnose.curve import Curve
 from calibrate.diagnose.linearised import State
 from calibrate.diagnose.noise_law import noise_law
-from calibrate.diagnose.null import Null, null_of
-from calibrate.diagnose.visible import Menu
+from calibrate.diagnose.null import DRAWS, Null, null_of
 from calibrate.effects.form import Form
 from calibrate.effects.ports import Place
 from calibrate.effects.second_encoders import placed
@@ -24,6 +23,7 @@ ALPHA_DRIFT = 0.05  # of the first term against noise that wanders
 ALPHA_FURTHER = 0.01
 # Of BIC: accepted for now without drawing a null; the last check draws one for all. Slow ones face a wander, too.
 SURE, SURE_SLOW = 60.0, 150.0
+FEW_DRAWS = 200  # of a null on the way; the last one has more
 BETTER = 0.5  # of BIC, for an exchange
 HELD = 2  # harmonics of a turn that a smooth curve over a part of it can be
 SMOOTH = (Shape.LINEAR, Shape.QUADRATIC, Shape.CUBIC, Shape.HARMONIC)  # a step, a sign or a decay is no smooth curve
@@ -93,7 +93,7 @@ def cause_of(term: Term) -> Key:
     return (*term.key[:-1], kept)
 
 
-def null_at(bench: Bench, rng: Generator, menu: Menu | None = None) -> Null:
+def null_at(bench: Bench, rng: Generator, draws: int = DRAWS) -> Null:
     """Null of a state, from its own residual."""
     law = noise_law(bench.state.rows, bench.sight, bench.state.drivers.t_s, rng)
-    return null_of(bench.menu if menu is None else menu, law, rng)
+    return null_of(bench.menu, law, rng, draws)

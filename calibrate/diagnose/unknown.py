@@ -20,7 +20,7 @@ from calibrate.diagnose.null import is_slow
 from calibrate.diagnose.open_families import Allowed, Families, Offer, anything, fitted_curve, open_families
 from calibrate.diagnose.pruning import CANCELS
 from calibrate.diagnose.score import gain_of, removed
-from calibrate.diagnose.search import grown_out
+from calibrate.diagnose.search import grown_out, settled
 from calibrate.diagnose.searching import ALPHA_FURTHER, SURE, Key, Search, cause_of, holds
 from calibrate.diagnose.tail import Tail
 from calibrate.effects.ports import Place
@@ -46,15 +46,15 @@ class Case:
 
 def with_unknowns(at: Search) -> Search:
     """Names replaced where an open family forbids them, curves added where structure remains."""
-    given_up: frozenset[Keys] = frozenset()
+    start, given_up = at, frozenset[Keys]()
     for _ in range(ROUNDS):
         changed, gone = _forbidden(at, open_families(at.bench), given_up)
         given_up |= gone
         changed = _filled(changed, grown=changed is at)
         if changed is at:
-            return at
+            break
         at = grown_out(changed)
-    return at
+    return at if at is start else settled(at)
 
 
 def _forbidden(at: Search, families: Families, given_up: frozenset[Keys]) -> tuple[Search, frozenset[Keys]]:
