@@ -22,7 +22,7 @@ from calibeam.results.identification import Planned, identify_session, session_m
 from calibeam.simulation.replayed_recording import Replayed, replay
 from calibeam.software import SOFTWARE
 from calibrate.diagnose.compare.beside import device_between
-from calibrate.diagnose.compare.corrected import simulated_of
+from calibrate.diagnose.compare.corrected import corrected_samples, simulated_of
 from calibrate.diagnose.compare.matched import match
 from calibrate.diagnose.compare.seated import is_seated
 from calibrate.diagnose.diagnosis import Verdict
@@ -35,6 +35,7 @@ from calibrate.model_file import ModelFile
 from calibrate.physics.from_diagnosis import model_of_diagnosis, model_of_fit
 from calibrate.report.quantities import significant
 from calibrate.sensors import position, spots, wire
+from calibrate.sensors.target import TARGETS
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -130,11 +131,13 @@ def reconcile(measured: Recording, simulation: Recording | str, name: str, *, se
     model = _timed(model_of_diagnosis(found, part), measured.samples)
     geometry = _timed(_geometry(found, part), measured.samples)
     replayed = replay(measured, model, seed=seed, noise_found=True)
-    plain = replay(measured, geometry, noisy=False)
+    plain = replay(measured, geometry, noisy=False).exact
+    if isinstance(simulation, Recording):
+        plain = _geometry_alone(measured, simulated, seen)
     after = compare(measured, _as_recording(measured, replayed.samples, "simulated.mcap"))
     told, rows = _unseen(
         measured.samples,
-        (_set_alike(measured, simulated, seen), plain.exact, replayed.exact),
+        (_set_alike(measured, simulated, seen), plain, replayed.exact),
         unseen,
         diagnosis,
     )
@@ -153,7 +156,7 @@ def reconcile(measured: Recording, simulation: Recording | str, name: str, *, se
         tuple(unseen.tolist()),
         told,
         rows,
-        tuple(_left_out(before, diagnosis)),
+        tuple(_left_out(before, diagnosis, isinstance(simulation, Recording))),
         remains,
         diagnosis.next,
         tuple(dict.fromkeys((*before.notes, *replayed.notes, *after.notes))),
@@ -191,11 +194,12 @@ def _sides(
 
 
 def _stated(drawn: Recording) -> tuple[str, ...]:
-    """Parameters that the rig file states: arm and pair of detectors, and the target on it where it has a point.
+    """Parameters that the rig file states: arm and pair of detectors, and the targets on it that have a point.
 
     Were the detectors fitted, they would bend by millimetres to make up for an arm that is another one.
     """
-    stated = (*BUILT, "tool.") if drawn.rig.tool.point_m is not None else BUILT
+    stated = (*BUILT, *(f"{TARGETS}{k}." for k in drawn.rig.targets))
+    stated = (*stated, "tool.") if drawn.rig.tool.point_m is not None else stated
     return tuple(p.name for p in session_of(drawn.rig, drawn.samples).parameters if p.name.startswith(stated))
 
 
@@ -219,6 +223,20 @@ def _geometry(found: Diagnosed, part: Recording) -> ModelFile:
         raise DataError("the whole file is wrong; how is in diagnosis.json")
     alone = found.physics.geometry
     return model_of_fit(alone, alone, found.cleared, part, "geometry alone")
+
+
+def _geometry_alone(measured: Recording, simulated: Recording, seen: Ints) -> Samples:
+    """The simulated readings with the geometry of the seen rows: what no geometry gives stays as simulated."""
+    pair = measured.samples, simulated.samples
+    own = simulated_of(simulated.rig, pair[1])
+    without = replace(measured, samples=corrected_samples(own, pair, device_between(own, pair)))
+    part = replace(without, samples=without.samples.take(seen), streams={}, events=())
+    free = Planned(FitPlan(schema=1, share=0.0, splits=()))
+    model = session_model(identify_session(part, free), part, free)
+    exact = replay(without, model, noisy=False).exact
+    names = [name for one in QUANTITIES.values() for name in one if name in exact]
+    kept = {n: exact.column(n) + measured.samples.column(n) - without.samples.column(n) for n in names}
+    return Samples({**exact.columns, **kept}, exact.n_joints)
 
 
 def _timed(model: ModelFile, samples: Samples) -> ModelFile:
@@ -302,10 +320,13 @@ def _few_rows(one: UnseenRecord, rows: Sequence[RowRecord]) -> str:
     return ""
 
 
-def _left_out(before: ComparisonFile, diagnosis: DiagnosisFile) -> Iterator[LeftOut]:
-    """Physics as the diagnosis of the seen rows names it, then what the comparison names beside it."""
+def _left_out(before: ComparisonFile, diagnosis: DiagnosisFile, has_physics: bool) -> Iterator[LeftOut]:
+    """Physics as the diagnosis of the seen rows names it, then what the comparison names beside it.
+
+    `has_physics`: the simulation may hold some of its own, so that only the comparison shows what it lacks.
+    """
     named: set[tuple[str, str]] = set()
-    for finding in diagnosis.findings:
+    for finding in () if has_physics and before.diagnosis is not None else diagnosis.findings:
         named.add((finding.where, finding.physics))
         others = tuple(f"{r.physics} at {r.where}" for r in finding.rivals)
         yield LeftOut(finding.where, finding.physics, finding.says, others)

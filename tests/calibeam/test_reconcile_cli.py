@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -102,3 +103,47 @@ def test_few_rows_that_carry_what_remains_are_listed(tmp_path):
     found = reconcile(replace(recording, samples=samples), rig_text(RIG), "rig.toml").file
     assert found.verdict == "differ"
     assert any(f"without 1 of {FEW // 4} rows, at {unseen[0]}.00 s" in one for one in found.remains)
+
+
+TARGETS_M = {1: (0.02, 0.0, 0.08), 2: (-0.07, 0.04, 0.06), 3: (0.01, -0.08, 0.07)}
+APART_M = 1e-3  # by which target 2 truly sits beside its drawing
+
+
+def of_three_targets(folder, poses_rad):
+    """Every pose read at three targets; `[tool] point_m` is none of them."""
+    worlds = {k: arm(POINT_M=np.subtract(point, arm().POINT_M)) for k, point in TARGETS_M.items()}
+    worlds[2].POINT_M[2] += APART_M
+    q_rad = np.repeat(poses_rad, 3, axis=0)
+    named = np.resize([1, 2, 3], len(q_rad))
+    rig = RIG.read_text(encoding="utf-8").replace("point_m = [0.02, 0.0, 0.08]", "")
+    rig += "".join(f"\n[[target]]\nid = {k}\npoint_m = {list(point)}\n" for k, point in TARGETS_M.items())
+    ways = iter(named.tolist())
+    world = SimpleNamespace(reflector_m=lambda q: worlds[next(ways)].reflector_m(q))
+    return session(folder, q_rad, q_rad, world, rig=rig, target=named)
+
+
+@pytest.mark.usefixtures("bare_figures")
+def test_every_target_is_replayed_and_compared_at_its_own_point(tmp_path):
+    folder, out = of_three_targets(tmp_path / "measured", poses()[:30]), tmp_path / "out"
+    assert run(["reconcile", str(folder), "--simulation", str(folder / "rig.toml"), "--out", str(out)]) == 0
+    said = json.loads((out / "reconcile.json").read_bytes())
+    assert [one["where"] for one in said["left_out"]] == ["tool.point 2"]
+    (position,) = said["unseen"]
+    assert position["before_m"] > 0.1 * APART_M
+    assert position["after"] < 1.3
+    assert said["verdict"] == "agree"
+
+
+@pytest.mark.usefixtures("bare_figures")
+def test_geometry_alone_keeps_the_physics_that_the_simulation_has(tmp_path):
+    q_rad = poses()
+    zero_rad = np.array([0.0, 0.0, ZERO_RAD, 0.0, 0.0, 0.0])
+    measured = session(tmp_path / "measured", q_rad, soft(q_rad), arm())
+    simulated = session(tmp_path / "simulated", q_rad, soft(q_rad) - zero_rad, arm(), seed=3)
+    out = tmp_path / "out"
+    assert run(["reconcile", str(measured), "--simulation", str(simulated), "--out", str(out)]) == 0
+    said = json.loads((out / "reconcile.json").read_bytes())
+    assert [(one["where"], one["physics"]) for one in said["left_out"]] == [("joint3.angle", "joint-zero-moved")]
+    (position,) = said["unseen"]
+    assert position["before"] > 5.0
+    assert position["geometry"] < 1.6  # both recordings scatter
