@@ -68,7 +68,8 @@ def reconcile_command(
 def _write(out: Path, found: Reconciled, source: Recording) -> None:
     """Every file of the folder."""
     out.mkdir(parents=True, exist_ok=True)
-    write_json(out / "before.json", found.before)
+    if found.before is not None:
+        write_json(out / "before.json", found.before)
     if found.brought is not None:
         write_diagnosis(out / "diagnosis.json", found.brought.diagnosis)
         write_model(out / "model.json", found.brought.model)

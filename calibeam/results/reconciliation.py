@@ -44,6 +44,7 @@ Ints = NDArray[np.int64]
 BEYOND = 3.0  # times the stated noise of the instrument: more is not noise unless repeated poses scatter as much
 REPEATED = "scatter within repeats"  # how the source of such a noise begins
 FRAME = 6  # of a measuring device
+FRAME_ROWS = 3  # of a tracker, for its frame
 AGREES = 1.3  # rms over noise on unseen rows, up to which nothing is left
 UNSEEN = 0.25  # share of the poses
 FEWEST_UNSEEN = 5
@@ -142,7 +143,7 @@ class Reconciled:
     """All that is written; `brought` None: too few rows."""
 
     file: ReconcileFile
-    before: ComparisonFile
+    before: ComparisonFile | None  # None: not even the frame of a device can be found
     measured: Recording  # the rows that both have
     brought: Brought | None
 
@@ -153,10 +154,14 @@ def reconcile(measured: Recording, simulation: Recording | str, name: str, *, se
     Too few rows to diagnose and to keep some unseen are a result, too. DataError where the two cannot be compared.
     """
     _refuse_unread(measured.samples)
+    if len(measured.samples) < FRAME_ROWS:
+        return _of_few(measured, (), name, seed, None)
     measured, simulated, seen, unseen = _sides(measured, simulation, name, seed)
     before = compare(measured, simulated)
     if not _enough(seen, unseen):
-        return _of_few(measured, simulated, name, seed, before)
+        alike = _set_alike(measured, simulated, np.arange(len(measured.samples)))
+        found = tuple(_on_all_rows(measured.samples, alike, _stated_m(measured.rig)))
+        return _of_few(measured, found, name, seed, before)
     part = replace(measured, samples=measured.samples.take(seen), streams={}, events=())
     found, diagnosis = diagnose_recording(part)
     model = _timed(model_of_diagnosis(found, part), measured.samples)
@@ -196,17 +201,14 @@ def reconcile(measured: Recording, simulation: Recording | str, name: str, *, se
     return Reconciled(file, before, measured, Brought(diagnosis, model, replayed, after))
 
 
-def _of_few(measured: Recording, simulated: Recording, name: str, seed: int, before: ComparisonFile) -> Reconciled:
+def _of_few(
+    measured: Recording, found: tuple[AllRowsRecord, ...], name: str, seed: int, before: ComparisonFile | None
+) -> Reconciled:
     """What all rows show without a diagnosis: how far apart the two are, and whether noise alone may do it."""
-    every = np.arange(len(measured.samples))
-    alike = _set_alike(measured, simulated, every)
-    found = tuple(_on_all_rows(measured.samples, alike, _stated_m(measured.rig)))
     beyond = [one for one in found if one.stated_m is not None and one.low_m > AGREES * one.stated_m]
     poses, needed = int(_poses(measured.samples).max()) + 1, round(FEWEST / (1.0 - UNSEEN))
-    open_ = (
-        f"{counted(len(every), 'row')} in {counted(poses, 'pose')}: what the simulation lacks cannot be decided; "
-        f"about {needed} poses are needed"
-    )
+    rows = f"{counted(len(measured.samples), 'row')} in {counted(poses, 'pose')}"
+    open_ = f"{rows}: what the simulation lacks cannot be decided; about {needed} poses are needed"
     far = "; ".join(
         f"{one.instrument} {length(one.rms_m)} rms ({length(one.low_m)} to {length(one.high_m)})" for one in found
     )
@@ -215,7 +217,7 @@ def _of_few(measured: Recording, simulated: Recording, name: str, seed: int, bef
     says += " with so few rows whether simulation and recording agree" * (not beyond) + (f": {far}." if far else ".")
     file = ReconcileFile(
         1, "calibeam-reconciliation", SOFTWARE, measured.path.name, name, verdict, says, seed, 0, (), (), (), (),
-        (open_,), (f"measure at least {needed} poses",), before.notes, found,
+        (open_,), (f"measure at least {needed} poses",), before.notes if before else (), found,
     )  # fmt: skip
     return Reconciled(file, before, measured, None)
 

@@ -41,7 +41,7 @@ def reconciliation_html(found: Reconciled) -> str:
 
 
 def _before(found: Reconciled) -> Html:
-    file, first = found.file, found.before.first_link
+    file, first = found.file, found.before.first_link if found.before else None
     where = f" They differ first at the {first}." if first else ""
     lead = (
         f"Measured less simulated on {len(file.unseen_rows)} rows that nothing was fitted to; where the measuring "

@@ -95,6 +95,12 @@ def test_of_few_rows_it_cannot_be_decided_and_a_difference_beyond_the_noise_can(
     assert {path.name for path in out.iterdir()} == {"page.html", "reconcile.json", "before.json"}
 
 
+def test_two_rows_do_not_even_place_the_tracker(tmp_path):
+    said, out = reconciled(tmp_path, session(tmp_path / "measured", poses()[:2], poses()[:2], arm()))
+    assert (said["verdict"], said["all_rows"]) == ("undecided", [])
+    assert {path.name for path in out.iterdir()} == {"page.html", "reconcile.json"}
+
+
 def test_few_rows_that_are_far_off_differ_for_certain(tmp_path):
     q_rad = poses()[:12]
     said, _ = reconciled(tmp_path, session(tmp_path / "measured", q_rad, soft(q_rad), arm()))

@@ -113,7 +113,7 @@ def _pyarrow(module: str) -> Any:
 
 
 def read_csv(path: Path | str, rig: Rig, *, joints_needed: bool = True) -> Samples:
-    """The samples of a CSV file (UTF-8, header row, commas, empty = missing); without joint angles where none is needed.
+    """The samples of a CSV file (UTF-8, header row, commas, empty = missing); without joints where none is needed.
 
     SamplesError naming file, row, column, value and remedy.
     """
