@@ -18,7 +18,7 @@ from simulators.arm.kinematics import Arm
 from simulators.arm.rigid import inverse
 from simulators.arm.statics import weigh
 from simulators.conceal.observe import readings_at
-from simulators.conceal.readings import Stance, length_m, position_m, spots, stand, true_shaft_rad
+from simulators.conceal.readings import Stance, length_m, position_m, spots, stand, tip_m, true_shaft_rad
 from simulators.conceal.rig import Device, DualPsd, TrueRig
 from simulators.defects import Defect, Scene
 from simulators.defects.defect import MovesDevice, ReadsAngle, TurnsJoint
@@ -52,7 +52,7 @@ class Rigged:
     """The arm and what stands around it; None: the rig has no such instrument."""
 
     arm: Arm
-    tool_point_m: Floats  # (3,) target or probe in the flange frame
+    tool_point_m: Floats  # (3,) target or probe in the flange frame; (row, 3) where several are read in turn
     light: DualPsd | None = None
     tracker: Mounted | None = None  # a tracker or a wire drum; of its body only the turn counts
     camera: Mounted | None = None
@@ -103,13 +103,9 @@ def _seated(rig: Rigged, seat_m: Floats, scene: Scene, defects: Sequence[Defect]
     """Rows that are in no cone stay as they are."""
     own = TrueRig(rig.arm, rig.tool_point_m, Device(np.eye(4)))
     free = ~np.isfinite(seat_m).all(axis=1, keepdims=True)
-    anywhere = np.where(free, _tip_m(own, stand(own, scene, defects, reading_rad)), seat_m)
+    anywhere = np.where(free, tip_m(own, stand(own, scene, defects, reading_rad)), seat_m)
     posture_rad = true_shaft_rad(defects, scene, reading_rad)
     return np.where(free, reading_rad, readings_at(own, anywhere, scene, defects, posture_rad))
-
-
-def _tip_m(rig: TrueRig, stance: Stance) -> Floats:
-    return stance.T_base_tool[:, :3, :3] @ rig.tool_point_m + stance.T_base_tool[:, :3, 3]
 
 
 def _seen(

@@ -37,8 +37,16 @@ LONGEST_TEXT = 40  # characters: the texts that a column of samples may hold hav
 _WHOLE_LIMIT = 2.0**53  # beyond, float64 has no unit step
 
 
-def checked_samples(columns: Mapping[str, Sequence[Cell]], rig: Rig, place: Place) -> Samples:
-    """The table of these cells. SamplesError naming file, row, column, value and remedy for the first fault."""
+def checked_samples(
+    columns: Mapping[str, Sequence[Cell]], rig: Rig, place: Place, *, joints_needed: bool = True
+) -> Samples:
+    """The table of these cells. SamplesError naming file, row, column, value and remedy for the first fault.
+
+    `joints_needed`: else a table without any joint angle has NaN for them.
+    """
+    joints = per_joint("q", "_rad", rig.n_joints)
+    if without := not joints_needed and not any(name in columns for name in joints):
+        columns = {**columns, **dict.fromkeys(joints, [None] * max(map(len, columns.values()), default=0))}
     for fault in _header_faults(tuple(columns), rig.n_joints):
         raise _error(fault, place)
     table: dict[str, NDArray[Any]] = {}
@@ -47,7 +55,8 @@ def checked_samples(columns: Mapping[str, Sequence[Cell]], rig: Rig, place: Plac
             table[name] = _array(name, cells)
         except _BadCellError as bad:
             raise _error((bad.row, name, bad.says), place) from None
-    first = min(_table_faults(table, rig), key=lambda fault: -1 if fault[0] is None else fault[0], default=None)
+    needed = ("t_s",) if without else required(rig.n_joints)
+    first = min(_table_faults(table, rig, needed), key=lambda fault: -1 if fault[0] is None else fault[0], default=None)
     if first is not None:
         raise _error(first, place)
     return Samples(table, rig.n_joints)
@@ -149,9 +158,9 @@ def _whole(array: NDArray[np.float64]) -> None:
         raise _BadCellError(odd[0], f"{array[odd[0]]} is not a whole number; correct it")
 
 
-def _table_faults(table: Table, rig: Rig) -> Iterator[Fault]:
+def _table_faults(table: Table, rig: Rig, needed: Sequence[str]) -> Iterator[Fault]:
     """The first row of every kind of fault."""
-    for name in required(rig.n_joints):
+    for name in needed:
         yield from _first(np.isnan(table[name]), name, "the value is missing (empty or NaN); it is needed in every row")
     yield from _together(table, POSITION)
     yield from _together(table, ORIENTATION)

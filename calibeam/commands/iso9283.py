@@ -174,7 +174,8 @@ def evaluate_test(
 ) -> None:
     """Evaluate a recording: pose accuracy and repeatability, distances, drift.
 
-    Rows of one pose are those of one number in column `repeat`; without it, those with the same joints.
+    Rows of one pose are those of one number in column `repeat`; without it, those with the same joints. A table with
+    that column and positions but without joints has the repeatability; with --plan all figures.
 
     For example:
 
@@ -218,7 +219,7 @@ def _samples(recording: Path, rig: Path | None) -> tuple[Samples, Rig]:
     """DataError for a table without its rig."""
     if rig is not None:
         loaded = load_rig(rig)
-        return read_csv(recording, loaded), loaded
+        return read_csv(recording, loaded, joints_needed=False), loaded
     if recording.suffix == ".csv" and recording.name != "samples.csv":
         raise DataError(
             f"{recording}: a table needs its rig file: give --rig, or make a session of it: calibeam import"

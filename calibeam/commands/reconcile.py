@@ -41,8 +41,8 @@ def reconcile_command(
         The simulation: a recording of the same plan, a session folder, or a rig file (.toml), whose arm as stated is
         moved through the recorded poses.
     out
-        Folder for page.html, reconcile.json, before.json, diagnosis.json, model.json, simulated.mcap and after.json;
-        has to be empty.
+        Folder for page.html, reconcile.json, before.json, diagnosis.json, model.json, simulated.mcap and after.json
+        (of too few rows the first three); has to be empty.
     seed
         Of the split into seen and unseen rows, and of the noise of simulated.mcap.
     json
@@ -68,11 +68,13 @@ def reconcile_command(
 def _write(out: Path, found: Reconciled, source: Recording) -> None:
     """Every file of the folder."""
     out.mkdir(parents=True, exist_ok=True)
-    write_json(out / "before.json", found.before)
-    write_diagnosis(out / "diagnosis.json", found.diagnosis)
-    write_model(out / "model.json", found.model)
-    about = {"replayed": source.path.name, "model": "model.json", "seed": str(found.file.seed), "noise": "as found"}
-    write_replayed(out / "simulated.mcap", found.simulated, found.measured, about)
-    write_json(out / "after.json", found.after)
+    if found.before is not None:
+        write_json(out / "before.json", found.before)
+    if found.brought is not None:
+        write_diagnosis(out / "diagnosis.json", found.brought.diagnosis)
+        write_model(out / "model.json", found.brought.model)
+        about = {"replayed": source.path.name, "model": "model.json", "seed": str(found.file.seed), "noise": "as found"}
+        write_replayed(out / "simulated.mcap", found.brought.simulated, found.measured, about)
+        write_json(out / "after.json", found.brought.after)
     write_json(out / "reconcile.json", found.file)
     write_reconciliation_page(out / "page.html", found)

@@ -173,7 +173,8 @@ def print_reconciliation(console: Console, file: ReconcileFile) -> None:
                 ("after physics", one.after_m, one.after),
             )
         )
-        _say(console, f"{one.instrument}, {one.rows} unseen rows, rms: " + ", ".join(parts))
+        stated = "" if one.stated_m is None else f"; stated noise {length(one.stated_m)}"
+        _say(console, f"{one.instrument}, {one.rows} unseen rows, rms: " + ", ".join(parts) + stated)
     _list(console, "what the simulation lacks:", [one.says for one in file.left_out])
     _list(console, "what remains:", file.remains)
     _list(console, "what to do next:", file.next if file.remains else ())

@@ -16,6 +16,7 @@ DASH = "–"
 FRAMES = {
     "fit": "the device stands where the poses themselves fit best: what moves all of them alike is no error here",
     "model": "the device stands where the model's session found it",
+    "device": "as measured: repeatability does not depend on where the device stands",
     "rig": "the device stands where [device] of the rig file puts it, taken to be exact",
 }
 
@@ -58,7 +59,9 @@ def _largest(what: str, poses: Sequence[PosePerformance]) -> str:
     """The figures that a data sheet states: the worst pose."""
 
     def worst(of: Callable[[PosePerformance], Performance | None]) -> str:
-        values = [(figure, one.pose) for one in poses if (figure := of(one)) is not None]
+        values = [
+            (figure, one.pose) for one in poses if (figure := of(one)) is not None and not math.isnan(figure.value)
+        ]
         if not values:
             return ""
         figure, pose = max(values, key=lambda pair: pair[0].value)
@@ -115,7 +118,8 @@ def _others(test: PoseTest) -> list[str]:
 
 
 def _distance(one: DistancePerformance) -> str:
+    command = "" if math.isnan(one.command_m) else f" {MM * one.command_m:.3f} mm,"
     return (
-        f"distance P{one.poses[0]} to P{one.poses[1]}{{}}, {MM * one.command_m:.3f} mm, {one.cycles} cycles: "
+        f"distance P{one.poses[0]} to P{one.poses[1]}{{}},{command} {one.cycles} cycles: "
         f"AD {millimetres(one.accuracy_m)} mm, RD ± {millimetres(one.repeatability_m)} mm"
     )

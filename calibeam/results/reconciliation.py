@@ -5,40 +5,46 @@ away, before and after, is measured on the others. The two comparisons take all 
 described in docs/formats.md.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import msgspec
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import chi2
 
 from acquisition.recording import Recording, Samples, readings_sha256
-from acquisition.recording.rig import parse_rig
-from acquisition.recording.samples import POSITION, SPOTS, WIRE
+from acquisition.recording.rig import Rig, parse_rig
+from acquisition.recording.samples import ORIENTATION, POSITION, SPOTS, WIRE
 from calibeam.results.comparison import ComparisonFile, compare
 from calibeam.results.diagnosis import diagnose_recording
 from calibeam.results.identification import Planned, identify_session, session_model
 from calibeam.simulation.replayed_recording import Replayed, replay
 from calibeam.software import SOFTWARE
 from calibrate.diagnose.compare.beside import device_between
-from calibrate.diagnose.compare.corrected import simulated_of
+from calibrate.diagnose.compare.corrected import corrected_samples, simulated_of
 from calibrate.diagnose.compare.matched import match
 from calibrate.diagnose.compare.seated import is_seated
 from calibrate.diagnose.diagnosis import Verdict
-from calibrate.diagnose.from_recording import Diagnosed
+from calibrate.diagnose.from_recording import FEWEST, Diagnosed
 from calibrate.diagnose.schema import DiagnosisFile
 from calibrate.diagnose.session import session_of
 from calibrate.errors import DataError
 from calibrate.fit_plan import FitPlan
 from calibrate.model_file import ModelFile
 from calibrate.physics.from_diagnosis import model_of_diagnosis, model_of_fit
-from calibrate.report.quantities import significant
-from calibrate.sensors import position, spots, wire
+from calibrate.report.quantities import counted, length, significant
+from calibrate.sensors import full_pose, position, spots, wire
+from calibrate.sensors.target import TARGETS
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
+BEYOND = 3.0  # times the stated noise of the instrument: more is not noise unless repeated poses scatter as much
+REPEATED = "scatter within repeats"  # how the source of such a noise begins
+FRAME = 6  # of a measuring device
+FRAME_ROWS = 3  # of a tracker, for its frame
 AGREES = 1.3  # rms over noise on unseen rows, up to which nothing is left
 UNSEEN = 0.25  # share of the poses
 FEWEST_UNSEEN = 5
@@ -46,7 +52,12 @@ FEW_ROWS = 0.05  # share of the unseen rows up to which they are listed
 SAME_POSE_RAD = 2e-3  # a servo comes back closer, and other poses are farther away
 BUILT = ("joint", "link", "psd")  # parameters of what a rig file states as built; where things stand is fitted
 # instrument -> lengths that it reads
-QUANTITIES = {spots.KIND.name: SPOTS, position.KIND.name: POSITION, wire.KIND.name: (WIRE,)}
+QUANTITIES = {
+    spots.KIND.name: SPOTS,
+    position.KIND.name: POSITION,
+    full_pose.KIND.name: POSITION,
+    wire.KIND.name: (WIRE,),
+}
 
 
 class RowRecord(msgspec.Struct, frozen=True):
@@ -72,6 +83,18 @@ class UnseenRecord(msgspec.Struct, frozen=True):
     before: float  # over noise
     geometry: float
     after: float
+    stated_m: float | None = None  # noise of the instrument by the rig file
+
+
+class AllRowsRecord(msgspec.Struct, frozen=True):
+    """Of too few rows to diagnose: measured less simulated on all, rms of a coordinate; `low_m` to `high_m`: 95 %."""
+
+    instrument: str
+    rows: int
+    rms_m: float
+    low_m: float
+    high_m: float
+    stated_m: float | None
 
 
 class LeftOut(msgspec.Struct, frozen=True):
@@ -91,7 +114,7 @@ class ReconcileFile(msgspec.Struct, frozen=True):
     software: str
     measured: str
     simulation: str
-    verdict: str  # agree or differ
+    verdict: str  # agree, differ or undecided
     says: str
     seed: int
     seen: int
@@ -102,41 +125,58 @@ class ReconcileFile(msgspec.Struct, frozen=True):
     remains: tuple[str, ...]
     next: tuple[str, ...]
     notes: tuple[str, ...]
+    all_rows: tuple[AllRowsRecord, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Brought:
+    """What was found of the seen rows, and the simulation with it."""
+
+    diagnosis: DiagnosisFile
+    model: ModelFile
+    simulated: Replayed
+    after: ComparisonFile
 
 
 @dataclass(frozen=True, eq=False)
 class Reconciled:
-    """All that is written."""
+    """All that is written; `brought` None: too few rows."""
 
     file: ReconcileFile
-    before: ComparisonFile
-    diagnosis: DiagnosisFile
-    model: ModelFile
-    simulated: Replayed
+    before: ComparisonFile | None  # None: not even the frame of a device can be found
     measured: Recording  # the rows that both have
-    after: ComparisonFile
+    brought: Brought | None
 
 
 def reconcile(measured: Recording, simulation: Recording | str, name: str, *, seed: int = 0) -> Reconciled:
     """`simulation`: its recording of the same plan, or the text of its rig file; `name` as a person knows it.
 
-    DataError where the two cannot be compared, or where there is too little to diagnose or to keep unseen.
+    Too few rows to diagnose and to keep some unseen are a result, too. DataError where the two cannot be compared.
     """
     _refuse_unread(measured.samples)
+    if len(measured.samples) < FRAME_ROWS:
+        return _of_few(measured, (), name, seed, None)
     measured, simulated, seen, unseen = _sides(measured, simulation, name, seed)
     before = compare(measured, simulated)
+    if not _enough(seen, unseen):
+        alike = _set_alike(measured, simulated, np.arange(len(measured.samples)))
+        found = tuple(_on_all_rows(measured.samples, alike, _stated_m(measured.rig)))
+        return _of_few(measured, found, name, seed, before)
     part = replace(measured, samples=measured.samples.take(seen), streams={}, events=())
     found, diagnosis = diagnose_recording(part)
     model = _timed(model_of_diagnosis(found, part), measured.samples)
     geometry = _timed(_geometry(found, part), measured.samples)
     replayed = replay(measured, model, seed=seed, noise_found=True)
-    plain = replay(measured, geometry, noisy=False)
+    plain = replay(measured, geometry, noisy=False).exact
+    if isinstance(simulation, Recording):
+        plain = _geometry_alone(measured, simulated, seen)
     after = compare(measured, _as_recording(measured, replayed.samples, "simulated.mcap"))
     told, rows = _unseen(
         measured.samples,
-        (_set_alike(measured, simulated, seen), plain.exact, replayed.exact),
+        (_set_alike(measured, simulated, seen), plain, replayed.exact),
         unseen,
         diagnosis,
+        _stated_m(measured.rig),
     )
     remains = tuple(_remains(told, rows, diagnosis, after))
     agrees = not remains
@@ -153,12 +193,67 @@ def reconcile(measured: Recording, simulation: Recording | str, name: str, *, se
         tuple(unseen.tolist()),
         told,
         rows,
-        tuple(_left_out(before, diagnosis)),
+        tuple(_left_out(before, diagnosis, isinstance(simulation, Recording))),
         remains,
         diagnosis.next,
         tuple(dict.fromkeys((*before.notes, *replayed.notes, *after.notes))),
     )
-    return Reconciled(file, before, diagnosis, model, replayed, measured, after)
+    return Reconciled(file, before, measured, Brought(diagnosis, model, replayed, after))
+
+
+def _of_few(
+    measured: Recording, found: tuple[AllRowsRecord, ...], name: str, seed: int, before: ComparisonFile | None
+) -> Reconciled:
+    """What all rows show without a diagnosis: how far apart the two are, and whether noise alone may do it."""
+    beyond = [one for one in found if one.stated_m is not None and one.low_m > AGREES * one.stated_m]
+    poses, needed = int(_poses(measured.samples).max()) + 1, round(FEWEST / (1.0 - UNSEEN))
+    rows = f"{counted(len(measured.samples), 'row')} in {counted(poses, 'pose')}"
+    open_ = f"{rows}: what the simulation lacks cannot be decided; about {needed} poses are needed"
+    far = "; ".join(
+        f"{one.instrument} {length(one.rms_m)} rms ({length(one.low_m)} to {length(one.high_m)})" for one in found
+    )
+    verdict = "differ" if beyond else "undecided"
+    says = "Simulation and recording differ by more than the stated noise" if beyond else "It cannot be decided"
+    says += " with so few rows whether simulation and recording agree" * (not beyond) + (f": {far}." if far else ".")
+    file = ReconcileFile(
+        1, "calibeam-reconciliation", SOFTWARE, measured.path.name, name, verdict, says, seed, 0, (), (), (), (),
+        (open_,), (f"measure at least {needed} poses",), before.notes if before else (), found,
+    )  # fmt: skip
+    return Reconciled(file, before, measured, None)
+
+
+def _on_all_rows(
+    measured: Samples, simulated: Samples, stated_m: Mapping[str, float | None]
+) -> Iterator[AllRowsRecord]:
+    """The frame of the device that was fitted takes degrees of freedom; so few rows leave wide limits."""
+    for name, columns in QUANTITIES.items():
+        if not all(c in measured and c in simulated for c in columns):
+            continue
+        misfit = (_stacked(measured, columns) - _stacked(simulated, columns))[_rows_of(name, measured)]
+        misfit = misfit[np.isfinite(misfit).all(axis=1)]
+        dof = misfit.size - FRAME
+        if dof < 1:
+            continue
+        rms_m = float(np.sqrt(np.sum(misfit**2) / dof))
+        low_m, high_m = (float(rms_m * np.sqrt(dof / chi2.ppf(q, dof))) for q in (0.975, 0.025))
+        yield AllRowsRecord(name, len(misfit), rms_m, low_m, high_m, stated_m.get(name))
+
+
+def _stated_m(rig: Rig) -> dict[str, float | None]:
+    """Noise of a coordinate by instrument, as the rig file states it."""
+    noise = rig.noise
+    in_space = dict.fromkeys((position.KIND.name, full_pose.KIND.name), noise.position_m)
+    return {spots.KIND.name: noise.psd_m, **in_space, wire.KIND.name: noise.wire_m}
+
+
+def _rows_of(name: str, samples: Samples) -> NDArray[np.bool_]:
+    """(row,) those that an instrument has read: a position with a turn is one of a 6-D target."""
+    every = np.ones(len(samples), dtype=np.bool_)
+    if name not in (position.KIND.name, full_pose.KIND.name):
+        return every
+    with_turn = all(column in samples for column in ORIENTATION)
+    turned = np.isfinite(_stacked(samples, ORIENTATION)).all(axis=1) if with_turn else ~every
+    return np.asarray(turned == (name == full_pose.KIND.name), dtype=np.bool_)
 
 
 def _refuse_unread(samples: Samples) -> None:
@@ -183,7 +278,7 @@ def _sides(
     seen, unseen = split(measured.samples, seed)
     here = replace(measured, events=())
     drawn = replace(here, rig=parse_rig(simulation, name), rig_text=simulation)
-    part = replace(drawn, samples=here.samples.take(seen))
+    part = replace(drawn, samples=here.samples.take(seen) if _enough(seen, unseen) else here.samples)
     told = Planned(FitPlan(schema=1, hold=_stated(part), share=0.0, splits=()))
     model = session_model(identify_session(part, told), part, told)
     exact = replay(drawn, model, noisy=False).exact
@@ -191,27 +286,32 @@ def _sides(
 
 
 def _stated(drawn: Recording) -> tuple[str, ...]:
-    """Parameters that the rig file states: arm and pair of detectors, and the target on it where it has a point.
+    """Parameters that the rig file states: arm and pair of detectors, and the targets on it that have a point.
 
     Were the detectors fitted, they would bend by millimetres to make up for an arm that is another one.
     """
-    stated = (*BUILT, "tool.") if drawn.rig.tool.point_m is not None else BUILT
+    stated = (*BUILT, *(f"{TARGETS}{k}." for k in drawn.rig.targets))
+    stated = (*stated, "tool.") if drawn.rig.tool.point_m is not None else stated
     return tuple(p.name for p in session_of(drawn.rig, drawn.samples).parameters if p.name.startswith(stated))
 
 
 def split(samples: Samples, seed: int) -> tuple[Ints, Ints]:
-    """Rows seen and unseen, a pose and its repeats on one side. DataError where too few are left."""
-    steps = np.round(samples.joints() / SAME_POSE_RAD)
-    _, pose = np.unique(steps, axis=0, return_inverse=True)
+    """Rows seen and unseen, a pose and its repeats on one side."""
+    pose = _poses(samples)
     drawn = np.random.default_rng(seed).permutation(int(pose.max(initial=-1)) + 1)
     away = drawn[: round(UNSEEN * len(drawn))]
     unseen = np.flatnonzero(np.isin(pose, away))
-    seen = np.flatnonzero(~np.isin(pose, away))
-    if len(unseen) < FEWEST_UNSEEN or not len(seen):
-        raise DataError(
-            f"{len(samples)} rows in {len(drawn)} poses: too few to keep a quarter unseen; measure more poses"
-        )
-    return seen, unseen
+    return np.flatnonzero(~np.isin(pose, away)), unseen
+
+
+def _enough(seen: Ints, unseen: Ints) -> bool:
+    return len(seen) >= FEWEST and len(unseen) >= FEWEST_UNSEEN
+
+
+def _poses(samples: Samples) -> Ints:
+    """(row,) number of the pose, from 0."""
+    steps = np.round(samples.joints() / SAME_POSE_RAD)
+    return np.unique(steps, axis=0, return_inverse=True)[1].reshape(-1)
 
 
 def _geometry(found: Diagnosed, part: Recording) -> ModelFile:
@@ -219,6 +319,20 @@ def _geometry(found: Diagnosed, part: Recording) -> ModelFile:
         raise DataError("the whole file is wrong; how is in diagnosis.json")
     alone = found.physics.geometry
     return model_of_fit(alone, alone, found.cleared, part, "geometry alone")
+
+
+def _geometry_alone(measured: Recording, simulated: Recording, seen: Ints) -> Samples:
+    """The simulated readings with the geometry of the seen rows: what no geometry gives stays as simulated."""
+    pair = measured.samples, simulated.samples
+    own = simulated_of(simulated.rig, pair[1])
+    without = replace(measured, samples=corrected_samples(own, pair, device_between(own, pair)))
+    part = replace(without, samples=without.samples.take(seen), streams={}, events=())
+    free = Planned(FitPlan(schema=1, share=0.0, splits=()))
+    model = session_model(identify_session(part, free), part, free)
+    exact = replay(without, model, noisy=False).exact
+    names = [name for one in QUANTITIES.values() for name in one if name in exact]
+    kept = {n: exact.column(n) + measured.samples.column(n) - without.samples.column(n) for n in names}
+    return Samples({**exact.columns, **kept}, exact.n_joints)
 
 
 def _timed(model: ModelFile, samples: Samples) -> ModelFile:
@@ -243,7 +357,11 @@ def _set_alike(measured: Recording, simulated: Recording, seen: Ints) -> Samples
 
 
 def _unseen(
-    measured: Samples, states: tuple[Samples, Samples, Samples], unseen: Ints, diagnosis: DiagnosisFile
+    measured: Samples,
+    states: tuple[Samples, Samples, Samples],
+    unseen: Ints,
+    diagnosis: DiagnosisFile,
+    stated_m: Mapping[str, float | None],
 ) -> tuple[tuple[UnseenRecord, ...], tuple[RowRecord, ...]]:
     """DataError where no instrument has a noise and unseen readings."""
     floors = {floor.instrument: floor for floor in diagnosis.floors}
@@ -257,13 +375,15 @@ def _unseen(
             continue
         read = _stacked(measured, columns)[unseen]
         misfits = [read - _stacked(state, columns)[unseen] for state in states]
-        known = np.all([np.isfinite(m).all(axis=1) for m in misfits], axis=0)
+        known = np.all([np.isfinite(m).all(axis=1) for m in misfits], axis=0) & _rows_of(name, measured)[unseen]
         if not known.any():
             continue
         was, plain, now = (float(np.sqrt(np.mean(m[known] ** 2))) for m in misfits)
         noise_m = float(floor.rms_m)
         over = was / noise_m, plain / noise_m, now / noise_m
-        told.append(UnseenRecord(name, int(known.sum()), was, plain, now, noise_m, floor.source, *over))
+        told.append(
+            UnseenRecord(name, int(known.sum()), was, plain, now, noise_m, floor.source, *over, stated_m.get(name))
+        )
         each = [np.sqrt(np.mean(m[known] ** 2, axis=1)).tolist() for m in misfits]
         t_s = measured.column("t_s")[unseen][known].tolist()
         rows += [RowRecord(name, *row) for row in zip(t_s, *each, strict=True)]
@@ -284,6 +404,11 @@ def _remains(
         if not one.after <= AGREES:
             where = _few_rows(one, [row for row in rows if row.instrument == one.instrument])
             yield f"{one.instrument}: {one.after:.2f} times the noise on unseen rows, more than {AGREES}{where}"
+        elif one.stated_m and one.after_m > BEYOND * one.stated_m and not one.noise_from.startswith(REPEATED):
+            yield (
+                f"{one.instrument}: {length(one.after_m)} on unseen rows, {significant(one.after_m / one.stated_m)} "
+                f"times the stated noise of {length(one.stated_m)}, and no repeated pose shows that it is noise"
+            )
     for left in (diagnosis.unexplained, *diagnosis.also_unexplained):
         if left is not None:
             yield left.says
@@ -302,10 +427,13 @@ def _few_rows(one: UnseenRecord, rows: Sequence[RowRecord]) -> str:
     return ""
 
 
-def _left_out(before: ComparisonFile, diagnosis: DiagnosisFile) -> Iterator[LeftOut]:
-    """Physics as the diagnosis of the seen rows names it, then what the comparison names beside it."""
+def _left_out(before: ComparisonFile, diagnosis: DiagnosisFile, has_physics: bool) -> Iterator[LeftOut]:
+    """Physics as the diagnosis of the seen rows names it, then what the comparison names beside it.
+
+    `has_physics`: the simulation may hold some of its own, so that only the comparison shows what it lacks.
+    """
     named: set[tuple[str, str]] = set()
-    for finding in diagnosis.findings:
+    for finding in () if has_physics and before.diagnosis is not None else diagnosis.findings:
         named.add((finding.where, finding.physics))
         others = tuple(f"{r.physics} at {r.where}" for r in finding.rivals)
         yield LeftOut(finding.where, finding.physics, finding.says, others)

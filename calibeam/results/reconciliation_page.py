@@ -6,7 +6,7 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
-from calibeam.results.reconciliation import Reconciled, ReconcileFile, RowRecord, UnseenRecord
+from calibeam.results.reconciliation import AGREES, BEYOND, Reconciled, ReconcileFile, RowRecord, UnseenRecord
 from calibeam.software import SOFTWARE
 from calibrate.report.diagnosis.finding_page import chain_figure, chain_of
 from calibrate.report.elements import Html, bullets, figure, page, panels, section, table, tag, tile, write_page
@@ -34,12 +34,14 @@ def reconciliation_html(found: Reconciled) -> str:
         tag("p", f"{file.measured} · {file.simulation} · {SOFTWARE}", cls="byline"),
     )
     verdict = tag("div", tag("strong", file.says), cls=f"verdict {'good' if file.verdict == 'agree' else 'care'}")
-    chapters = (verdict, _before(found), _left_out(found), _after(file), _remains(file))
-    return page(f"Reconciliation of {file.measured}", masthead, CONTENTS, chapters, SOFTWARE, kind="reconciliation")
+    contents, chapters = CONTENTS, (verdict, _before(found), _left_out(found), _after(file), _remains(file))
+    if found.brought is None:
+        contents, chapters = {"remains": CONTENTS["remains"]}, (verdict, _remains(file))
+    return page(f"Reconciliation of {file.measured}", masthead, contents, chapters, SOFTWARE, kind="reconciliation")
 
 
 def _before(found: Reconciled) -> Html:
-    file, first = found.file, found.before.first_link
+    file, first = found.file, found.before.first_link if found.before else None
     where = f" They differ first at the {first}." if first else ""
     lead = (
         f"Measured less simulated on {len(file.unseen_rows)} rows that nothing was fitted to; where the measuring "
@@ -67,7 +69,10 @@ def _left_out(found: Reconciled) -> Html:
 
 
 def _after(file: ReconcileFile) -> Html:
-    lead = "The same rows on the same scale: the simulation now has the geometry and the physics that were found."
+    lead = (
+        "The same rows on the same scale: the simulation now has the geometry and the physics that were found. After "
+        "geometry: the geometry alone, with the physics that the simulation had."
+    )
     rows = [
         (
             one.instrument,
@@ -81,16 +86,20 @@ def _after(file: ReconcileFile) -> Html:
                 )
             ),
             f"{length(one.noise_m)}, {one.noise_from}",
+            "not stated" if one.stated_m is None else length(one.stated_m),
         )
         for one in file.unseen
     ]
-    head = ("Instrument", "unseen rows", "before", "after geometry", "after physics", "noise")
+    head = ("Instrument", "unseen rows", "before", "after geometry", "after physics", "noise", "stated noise")
     listed = table(head, rows, numeric=range(1, 5), caption="rms of a coordinate, and how many times the noise")
     return section("after", CONTENTS["after"], lead, listed, *_pictures(file, "after"))
 
 
 def _remains(file: ReconcileFile) -> Html:
-    lead = "They agree where the unseen rows are within 1.3 times the noise and a comparison finds nothing more."
+    lead = (
+        f"They agree where the unseen rows are within {AGREES} times the noise, within {BEYOND:.0f} times the stated "
+        "noise or what repeated poses scatter, and a comparison finds nothing more."
+    )
     parts = [bullets(file.remains) if file.remains else tag("p", "Nothing that these samples show.")]
     if file.next:
         parts += [tag("p", tag("b", "What to record next")), bullets(file.next)]

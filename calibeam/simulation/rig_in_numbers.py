@@ -13,13 +13,14 @@ from scipy.spatial.transform import Rotation
 from acquisition.recording import Samples
 from acquisition.recording.rig import Arm as RigArm
 from acquisition.recording.rig import ArmModel, Rig
-from acquisition.recording.samples import BAR, SEAT
+from acquisition.recording.samples import BAR, SEAT, TARGET
 from calibrate.arms.catalogue import arm_of
 from calibrate.errors import DataError
 from calibrate.predict import Predictor
 from calibrate.rigid import transform
 from calibrate.sensors.bar import bar_pairs
 from calibrate.sensors.device import AXES, Device
+from calibrate.sensors.position import seen_at
 from calibrate.sensors.spots import dual_psd_of
 from simulators.arm.drawing import Drawing, Row, turning_com_m
 from simulators.arm.kinematics import Arm
@@ -37,12 +38,21 @@ def rigged(predictor: Predictor, samples: Samples) -> Rigged:
     """The rig of a model, with the instruments that the model knows and the samples used."""
     return Rigged(
         arm=arm_in_numbers(predictor),
-        tool_point_m=predictor.tip_at(np.eye(4)[np.newaxis])[0],
+        tool_point_m=_points_m(predictor, samples),
         light=_light(predictor, samples),
         tracker=tracker_of(predictor),
         camera=_camera(predictor),
         seat_m=_seats_m(predictor, samples),
     )
+
+
+def _points_m(predictor: Predictor, samples: Samples) -> Floats:
+    """(3,) target or probe in the flange; (row, 3) where rows name targets, those that name none at the tool's."""
+    own_m = predictor.tip_at(np.eye(4)[np.newaxis])[0]
+    if not predictor.rig.targets or TARGET not in samples:
+        return own_m
+    named_m = seen_at(predictor, np.tile(np.eye(4), (len(samples), 1, 1)), samples)
+    return np.where(np.isfinite(named_m), named_m, own_m)
 
 
 def arm_in_numbers(predictor: Predictor) -> Arm:

@@ -27,6 +27,7 @@ KNOWN = (degrees.hypotheses, joint_hypotheses.turned, joint_hypotheses.shifted, 
 
 GAIN = 4.0  # by which the strain must fall
 RIVAL = 1.5  # times the winner's strain: as good an explanation
+SMALL_M = 1e-4  # misfit of a file as written that no convention is needed for
 NOTHING_M = 2e-5  # no instrument shows less: rounding of perfect data must not separate conventions
 GROSS = 0.05  # of the reach: more than joint zeros 2 deg off explain, so that something else is wrong, or two things
 SIDE_BY_SIDE = 16  # trials evaluated at once: a hundred poses of so many stay in the processor's cache
@@ -207,10 +208,15 @@ def _compared(account: _Account) -> float:
 
 
 def _explains(account: _Account, known: _Account) -> bool:
-    """Whether a fraction is left of the distance, or of it with what drawn things must move, which never grows."""
+    """Whether a fraction is left of the distance, or of it with what drawn things must move, which never grows.
+
+    Where hardly any distance was there to begin with, the file is as the rig states, wherever the target sits.
+    """
     after, before = account.strain, known.strain
-    falls = _ratio(before.compared_m, after.compared_m), _ratio(before.typical_m, after.typical_m)
-    return max(falls) > GAIN and bool(after.compared_m < before.compared_m)
+    falls = _ratio(before.typical_m, after.typical_m)
+    if before.typical_m > SMALL_M:  # else only drawn things move, and a drawing of a bracket decides nothing
+        falls = max(falls, _ratio(before.compared_m, after.compared_m))
+    return falls > GAIN and bool(after.compared_m < before.compared_m)
 
 
 def _ratio(before_m: Floats, after_m: Floats) -> float:

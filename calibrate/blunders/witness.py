@@ -75,9 +75,9 @@ class Otherwise:
     witness: Witness
 
 
-def thinned(rows: Rows) -> Rows:
-    """No more than ENOUGH_POSES of these rows, evenly spread."""
-    return np.unique(rows[np.linspace(0, len(rows) - 1, ENOUGH_POSES).astype(np.intp)]) if len(rows) else rows
+def thinned(rows: Rows, most: int = ENOUGH_POSES) -> Rows:
+    """No more than so many of these rows, evenly spread."""
+    return np.unique(rows[np.linspace(0, len(rows) - 1, most).astype(np.intp)]) if len(rows) else rows
 
 
 def filled(samples: Samples, *names: str) -> Rows:

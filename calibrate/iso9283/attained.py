@@ -32,6 +32,7 @@ Ints = NDArray[np.int64]
 Frame = Literal["fit", "model", "rig"]
 
 CLOSE_RAD = 0.01  # rows whose joints are nearer than this to those of a pose are of it
+JOINTLESS = "no joint angles in the samples"
 FLAT_M = 1e-3  # smallest second extent of the poses by which a frame is fitted: below, they lie on a line
 MOVED_M, MOVED_SHARE = 1e-3, 5.0  # a device that stands elsewhere: error in the model's frame, and over that of a fit
 
@@ -41,7 +42,7 @@ class EvaluatedTest:
     """Figures of a recording. `predicted` and `corrected` need a model: AP that it predicts, and all with its help."""
 
     rows: int
-    frame: Frame
+    frame: Frame | Literal["device"]  # device: as measured, for nobody knows what was commanded
     measured: PoseTest
     predicted_m: Mapping[int, tuple[float, float]]  # pose -> AP that the model predicts, and one sigma
     corrected: PoseTest | None
@@ -71,6 +72,8 @@ def evaluate(
     samples = samples.take(np.argsort(samples.column("t_s"), kind="stable"))
     sent = _commanded(samples, rig, plan)
     part = samples.take(sent.rows)
+    if not np.isfinite(sent.wanted_rad).all():
+        return _repeatability(samples, sent, known)
     point_m, notes = _target(rig, known)
     wanted = RigArm.of_rig(rig).frames(sent.wanted_rad)[:, -1]
     wanted_m = wanted[:, :3, :3] @ point_m + wanted[:, :3, 3]
@@ -103,6 +106,18 @@ def evaluate(
     )
 
 
+def _repeatability(samples: Samples, sent: _Commanded, known: ModelFile | None) -> EvaluatedTest:
+    """What needs no command: AP, AD and dAP are NaN. DataError with a model, which is asked at the commands."""
+    if known is not None:
+        raise DataError(f"{JOINTLESS}: a model cannot be asked; give --plan, or the columns q1_rad …")
+    part = samples.take(sent.rows)
+    seen_m = np.stack([part.column(c) for c in POSITION], axis=1)
+    nowhere = np.full(seen_m.shape, np.nan)
+    attained = AttainedPoses(sent.pose, _sides(samples)[sent.rows], part.column("t_s"), nowhere, seen_m, None)
+    note = f"{JOINTLESS}: repeatability alone; for accuracy and orientation give --plan, or the columns q1_rad …"
+    return EvaluatedTest(len(part), "device", performance_of(attained), {}, None, (note,))
+
+
 def _commanded(samples: Samples, rig: Rig, plan: PosePlan | None) -> _Commanded:
     """DataError without positions, and for a row that is of no pose of the plan."""
     if any(c not in samples for c in POSITION):
@@ -119,6 +134,8 @@ def _commanded(samples: Samples, rig: Rig, plan: PosePlan | None) -> _Commanded:
             "no column cmd1_rad …: readings are taken for commands; the error of the controller itself is in no figure",
         )
     number = samples.integers("repeat", 0)
+    if np.isnan(given[with_position]).any() and not (number[with_position] > 0).any():
+        raise DataError(f"{JOINTLESS} and no column repeat: which rows are of one pose is not known; give one of them")
     if plan is not None:
         number = _of_plan(given, number, plan, with_position)
     elif not (number[with_position] > 0).any():
@@ -127,7 +144,10 @@ def _commanded(samples: Samples, rig: Rig, plan: PosePlan | None) -> _Commanded:
     if len(rows) == 0:
         raise DataError("no row with a position is of a repeated pose (column repeat); see calibeam iso9283 plan")
     pose, q_rad = number[rows], given[rows].copy()
-    if notes:  # readings scatter as the arm does; what was sent is the same in every cycle
+    if plan is not None and np.isnan(q_rad).any():
+        q_rad = np.array([_of_number(plan)[int(one)] for one in pose])
+        notes = ("no joints in the samples: the poses of the plan are taken for commands",)
+    elif notes:  # readings scatter as the arm does; what was sent is the same in every cycle
         for one in np.unique(pose):
             q_rad[pose == one] = q_rad[pose == one].mean(axis=0)
     if plan is None:
@@ -235,6 +255,8 @@ def _off_rad(attained: Floats, wanted: Floats) -> Floats:
 def _sides(samples: Samples) -> Ints:
     """(row,) number of the way in which all joints came; -1 where this is not known."""
     names = [f"approach{j + 1}" for j in range(samples.n_joints)]
+    if np.isnan(samples.joints()).all() and names[0] not in samples:
+        return np.full(len(samples), -1, dtype=np.int64)
     recorded = [name for name in names if name in samples]
     if recorded:
         ways = np.nan_to_num(np.stack([samples.column(name) for name in recorded], axis=1))

@@ -222,10 +222,11 @@ def _drift(attained: AttainedPoses, number: int) -> DriftPerformance | None:
         return None
     accuracy = tuple(pose_accuracy(one.attained_m, one.command_m) for one in sets)
     repeatability = tuple(pose_repeatability(one.attained_m) for one in sets)
-    error_m = [one.attained_m - one.command_m for one in sets]
+    commanded = bool(np.isfinite(main.command_m).all())
+    error_m = [one.attained_m - (one.command_m if commanded else 0.0) for one in sets]
 
     def largest(way: Callable[[Floats, Floats], float]) -> Performance:
-        """Of all sets, against the first one."""
+        """Of all sets, against the first one; of positions alone where no command is known."""
         return max((jackknifed(way, [error_m[0], late]) for late in error_m[1:]), key=lambda one: one.value)
 
     return DriftPerformance(
@@ -233,7 +234,7 @@ def _drift(attained: AttainedPoses, number: int) -> DriftPerformance | None:
         tuple(float(np.mean(one.t_s) - np.mean(sets[0].t_s)) for one in sets),
         accuracy,
         repeatability,
-        largest(_accuracy_apart),
+        largest(_accuracy_apart) if commanded else Performance(float("nan"), float("nan")),
         largest(_repeatability_apart),
         largest(_barycentres_apart),
     )

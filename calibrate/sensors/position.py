@@ -12,8 +12,8 @@ from acquisition.recording.rig import Rig
 from acquisition.recording.samples import ORIENTATION, POSITION, TARGET
 from calibrate.blunders.finding import BlunderKind
 from calibrate.blunders.other_session import rows_of_another_session
-from calibrate.blunders.rough_fit import rough_fit
-from calibrate.blunders.witness import Otherwise, Strain, Witness, by_target, filled, stacked, thinned
+from calibrate.blunders.rough_fit import rough_fit_of_targets
+from calibrate.blunders.witness import ENOUGH_POSES, Otherwise, Strain, Witness, by_target, filled, stacked, thinned
 from calibrate.chain import Chain
 from calibrate.errors import DataError
 from calibrate.parameters import Parameter
@@ -78,6 +78,7 @@ class Position(Usage):
 
 SAID_COLUMNS = "columns x_m, y_m, z_m"
 FEWEST_POSES = 12  # a frame and a target have nine unknowns
+FEWEST_OF_ONE = 4  # readings of one of several targets: fewer fit a point of their own whatever the arm does
 MILLIMETRES = 1e-3
 
 
@@ -87,16 +88,18 @@ class PositionWitness:
 
     q_rad: Floats  # (pose, joint)
     position_m: Floats  # (pose, 3)
-    point_m: Floats | None  # (3,) target at its nominal place in the flange frame
+    point_m: Floats | None  # (3,) target at its nominal place in the flange frame; (target, 3) of several, NaN: unknown
     mirrored: bool = False
     columns: str = SAID_COLUMNS
+    target: NDArray[np.intp] | None = None  # (pose,) which of several, from 0
 
     def strain(self, T_base_flange: Floats) -> Strain:
-        drawn = self.point_m
-        start = np.zeros(3) if drawn is None else drawn
-        found = rough_fit(T_base_flange, self.position_m, start, mirrored=self.mirrored)
-        moved = np.linalg.norm(found.point_m - start, axis=-1)
-        return Strain(found.typical_m, 0.0 * moved if drawn is None else moved)
+        drawn = np.full((1, 3), np.nan) if self.point_m is None else np.atleast_2d(self.point_m)
+        target = np.zeros(len(self.q_rad), dtype=np.intp) if self.target is None else self.target
+        start = np.nan_to_num(drawn)
+        found = rough_fit_of_targets(T_base_flange, self.position_m, start, target, mirrored=self.mirrored)
+        moved = np.nan_to_num(np.linalg.norm(found.point_m - drawn, axis=-1))
+        return Strain(found.typical_m, np.mean(moved, axis=-1))
 
     def otherwise(self) -> Iterator[Otherwise]:
         """As `written_otherwise`."""
@@ -176,13 +179,16 @@ def _build(table: SampleTable) -> Measured | None:
 
 
 def _witness(rig: Rig, samples: Samples, q_rad: Floats) -> Witness | None:
-    """Of several targets the one that was read most: the witness knows one point."""
+    """Of all targets together, each at a point of its own; one that was hardly read fits anywhere, and is left out."""
     each = by_target(rig, samples, filled(samples, *POSITION))
-    rows, point_m = max(each, key=lambda found: len(found[0]), default=(np.zeros(0, dtype=np.intp), None))
-    rows = thinned(rows)
-    if len(rows) < FEWEST_POSES:
+    each = tuple(one for one in each if len(one[0]) >= FEWEST_OF_ONE)
+    share = sum(len(rows) for rows, _ in each)
+    if share < FEWEST_POSES:
         return None
-    return PositionWitness(q_rad[rows], stacked(samples, POSITION)[rows], point_m)
+    some = [thinned(rows, max(FEWEST_OF_ONE, round(ENOUGH_POSES * len(rows) / share))) for rows, _ in each]
+    points_m = np.array([np.full(3, np.nan) if point_m is None else point_m for _, point_m in each])
+    rows, target = np.concatenate(some), np.repeat(np.arange(len(some)), [len(one) for one in some])
+    return PositionWitness(q_rad[rows], stacked(samples, POSITION)[rows], points_m, target=target)
 
 
 KIND = SensorKind(

@@ -16,7 +16,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simulators.arm.kinematics import forward, jacobian, reach_point, within_limits
-from simulators.conceal.readings import balanced, length_m, position_m, said_rad, spots, stand, tip_m, true_shaft_rad
+from simulators.conceal.readings import (
+    balanced,
+    carried_m,
+    length_m,
+    position_m,
+    said_rad,
+    spots,
+    stand,
+    tip_m,
+    true_shaft_rad,
+)
 from simulators.conceal.rig import Artefacts, Device, DualPsd, TrueRig
 from simulators.conceal.wanted import ConcealError, Side
 from simulators.defects import Defect, Scene, Site, UnsuitedError
@@ -57,7 +67,7 @@ def readings_at(rig: TrueRig, wanted_m: Floats, scene: Scene, defects: Sequence[
 def seated_tip_m(rig: TrueRig, reading_rad: Floats) -> Floats:
     """Where an arm without defects has its probe at these readings, (row, 3)."""
     flange = forward(rig.arm, reading_rad + rig.arm.zero_rad).flange
-    return flange[:, :3, :3] @ rig.tool_point_m + flange[:, :3, 3]
+    return carried_m(rig, flange)
 
 
 def seated_plan(

@@ -194,7 +194,12 @@ def spots(rig: TrueRig, fixture: DualPsd, scene: Scene, defects: Sequence[Defect
 
 def tip_m(rig: TrueRig, stance: Stance) -> Floats:
     """The target or probe in the base frame, (row, 3)."""
-    return stance.T_base_tool[:, :3, :3] @ rig.tool_point_m + stance.T_base_tool[:, :3, 3]
+    return carried_m(rig, stance.T_base_tool)
+
+
+def carried_m(rig: TrueRig, T_base_flange: Floats) -> Floats:
+    """(row, 3) the same point for a flange at (row, 4, 4)."""
+    return (T_base_flange[:, :3, :3] @ rig.tool_point_m[..., np.newaxis])[..., 0] + T_base_flange[:, :3, 3]
 
 
 def position_m(rig: TrueRig, device: Device, scene: Scene, defects: Sequence[Defect], stance: Stance) -> Floats:

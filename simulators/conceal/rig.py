@@ -54,7 +54,7 @@ class TrueRig:
     """Everything. `instrument` decides which readings the rig gives."""
 
     arm: Arm
-    tool_point_m: Floats  # (3,) target or probe in the flange frame
+    tool_point_m: Floats  # (3,) target or probe in the flange frame; (row, 3) where several are read in turn
     instrument: DualPsd | Device | Artefacts
 
 

@@ -121,3 +121,30 @@ def test_the_table_of_a_session_folder_means_the_folder(lab, capsys):
 def test_what_cannot_be_imported_is_told_in_one_sentence(lab, arguments, says, capsys):
     assert run(["import", *arguments]) == 1
     assert says in capsys.readouterr().err
+
+
+TARGET_RIG = "[[target]]\nid = {0}\npoint_m = [0.0, 0.0{0}, 0.08]\n"
+
+
+def tracked(tmp_path, cells, heading="Reflector"):
+    """A table of poses of several reflectors, and its rig file."""
+    rig, table = tmp_path / "rig.toml", tmp_path / "lab.csv"
+    rig.write_text(RIG.read_text() + "".join(TARGET_RIG.format(k) for k in (1, 2, 3)))
+    names = [*(f"q{j}_rad" for j in range(1, 7)), "x_m", "y_m", "z_m", heading]
+    rows = np.random.default_rng(3).uniform(0.5, 1.5, (len(cells), 9)).tolist()
+    lines = [",".join(map(str, (*row, cell))) for row, cell in zip(rows, cells, strict=True)]
+    table.write_text("\n".join([",".join(names), *lines]) + "\n")
+    return run(["import", str(table), "--rig", str(rig), "--out", str(tmp_path / "session"), "--yes"])
+
+
+@pytest.mark.parametrize("cells", [(1, 2, 3), ("R1", "R2", "R3"), ("SMR 1", "SMR 2", "SMR 3")])
+def test_a_column_of_reflectors_is_the_target_of_each_row(tmp_path, cells):
+    assert tracked(tmp_path, cells * 3) == 0
+    assert read(tmp_path / "session").samples.integers("target", 0).tolist() == [1, 2, 3] * 3
+
+
+def test_a_reflector_without_a_number_is_refused_with_what_to_do(tmp_path, capsys):
+    assert tracked(tmp_path, ("R1", "left", "R3")) == 1
+    told = capsys.readouterr().err
+    assert "row 3, column 'Reflector': 'left'" in told
+    assert "'Reflector' = unused" in told

@@ -100,6 +100,33 @@ def test_a_table_with_its_rig_has_the_figures_of_its_session(folder, capsys):
     assert "--rig" in capsys.readouterr().err
 
 
+def without_joints(folder, name):
+    """The table of the plan's session with time, positions and `repeat` alone."""
+    lines = [line.split(",") for line in (folder / "plan" / "samples.csv").read_text().splitlines()]
+    kept = [i for i, column in enumerate(lines[0]) if column in ("t_s", "x_m", "y_m", "z_m", "repeat")]
+    table = folder / f"{name}.csv"
+    table.write_text("\n".join(",".join(line[i] for i in kept) for line in lines) + "\n")
+    return [f"{name}.csv", "--rig", str(folder / "rig.toml")]
+
+
+def test_repeatability_asks_for_no_joints(folder, capsys):
+    whole, alone = figures(folder, "plan"), figures(folder, *without_joints(folder, "positions"))
+    for one, same in zip(whole["measured"]["poses"], alone["measured"]["poses"], strict=True):
+        assert same["repeatability_m"] == pytest.approx(one["repeatability_m"])
+        assert same["accuracy_m"]["value"] is None
+    assert "nan" not in capsys.readouterr().out
+    words = ["iso9283", "evaluate", str(folder / "positions.csv"), "--rig", str(folder / "rig.toml")]
+    assert run([*words, "--model", str(folder / "model.json"), "--out", str(folder / "x.json")]) == 1
+    assert "give --plan" in " ".join(capsys.readouterr().err.split())
+
+
+def test_a_plan_stands_in_for_joints(folder):
+    plan = ["--plan", str(folder / "plan.toml"), "--model", str(folder / "model.json")]
+    whole, alone = figures(folder, "plan", *plan), figures(folder, *without_joints(folder, "planned"), *plan)
+    for one, same in zip(whole["measured"]["poses"], alone["measured"]["poses"], strict=True):
+        assert same["accuracy_m"]["value"] == pytest.approx(one["accuracy_m"]["value"], abs=1e-9)
+
+
 def test_the_cube_that_is_found_is_in_reach():
     cube = cube_in_reach(RIG_HERE, "x-", np.array([0.38, 0.0, 0.3]))
     corners = cube_corners_m(cube.centre_m, cube.edge_m)

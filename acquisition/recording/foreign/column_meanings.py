@@ -18,7 +18,7 @@ from acquisition.recording.files.quantity import suffix_of
 from acquisition.recording.foreign.heading_units import folded, split_heading, unit_of
 from acquisition.recording.foreign.rotations import CONVENTIONS
 from acquisition.recording.foreign.sheet import Sheet
-from acquisition.recording.samples import ORIENTATION, POSITION, joint_of, per_joint
+from acquisition.recording.samples import ORIENTATION, POSITION, TARGET, joint_of, per_joint
 
 UNUSED, TIME, POSE_MATRIX, CAMERA = "unused", "t", "pose-matrix", "camera-"
 REMEDY = 'state it: --columns "A1..A6 [deg] = q, X Y Z [mm] = position"'
@@ -135,6 +135,10 @@ _SETS: Mapping[str, tuple[tuple[str, ...], ...]] = MappingProxyType(
     }
 )
 _LAST_ROW = tuple(tuple(f"{s}4{j}" for j in (1, 2, 3, 4)) for s in "mth")
+# further folded headings of columns that stand alone
+_ALSO: Mapping[str, tuple[str, ...]] = MappingProxyType(
+    {TARGET: ("targetid", "targetno", "reflector", "reflectorid", "reflectorno")}
+)
 _TIMES = ("t", "time", "timestamp", "zeit", "host")
 _ORIENTATIONS = ("abc", "wpr", "rotvec", "quaternion", "matrix")
 
@@ -185,7 +189,8 @@ class _Headings:
         for meaning in PER_JOINT:
             yield from self._per_joint(meaning)
         yield from self._sets()
-        yield from self._single([name for name in SINGLE if name != TIME], lambda name: (folded(name),))
+        names = [name for name in SINGLE if name != TIME]
+        yield from self._single(names, lambda name: (folded(name), *_ALSO.get(name, ())))
         for column in [c for columns in self._free.values() for c in columns]:
             match = _TEMPERATURE.fullmatch(name_of(self._sheet, column))
             if match and match[0] not in self._meant:

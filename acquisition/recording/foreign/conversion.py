@@ -35,7 +35,7 @@ from acquisition.recording.foreign.sheet import Raw, Sheet
 from acquisition.recording.recording import Recording
 from acquisition.recording.rig import Rig, parse_rig
 from acquisition.recording.sample_rules import checked_samples
-from acquisition.recording.samples import Cell, Floats, Samples, cells_of, per_joint
+from acquisition.recording.samples import TARGET, Cell, Floats, Samples, cells_of, per_joint
 from acquisition.recording.session_folder import export
 
 EPOCH_S = 1e8  # a time beyond counts from 1970 or the like, no session lasts three years
@@ -142,7 +142,8 @@ def understand(
         if group.meaning == UNUSED or group.meaning == TIME or group.meaning in TEXT:
             continue
         for column in group.columns:
-            numbers[column] = np.array(sheet.numbers(column), dtype=np.float64)
+            read = sheet.numbers_of_names if group.meaning == TARGET else sheet.numbers
+            numbers[column] = np.array(read(column), dtype=np.float64)
         if whole_rows:
             _check_whole_rows(sheet, group, numbers)
     return Understanding(sheet, rig_text, rig, groups, numbers)

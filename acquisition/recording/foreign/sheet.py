@@ -33,6 +33,7 @@ LARGE = ("xl/worksheets/", "xl/sharedStrings", "xl/charts/", "xl/drawings/", "xl
 BESIDE_BYTES = 2_000_000  # of any other part
 NUMBER = re.compile(r"[+-]?(?:\d++(?:\.\d*+)?|\.\d++)(?:[eE][+-]?\d+)?", re.ASCII)
 COMMA_NUMBER = re.compile(r"[+-]?(?:\d+,\d*|,\d+)(?:[eE][+-]?\d+)?", re.ASCII)
+NAMED = re.compile(r"[A-Za-z][A-Za-z #_.-]*(\d{1,6})", re.ASCII)  # such as R2
 ERRORS = re.compile(r"#[A-Z/0!?]+")  # of a spreadsheet: #REF!, #DIV/0!, #N/A
 NOT_THERE = ("", "nan", "na", "n/a", "null", "none", "-", "--")  # texts for a reading that is missing
 
@@ -66,6 +67,20 @@ class Sheet:
     def numbers(self, column: int) -> list[float]:
         """One column as numbers, NaN where a cell is empty. SamplesError for any other cell."""
         return [self._number(row, column, cell) for row, cell in enumerate(self.cells(column))]
+
+    def numbers_of_names(self, column: int) -> list[float]:
+        """The same of a column that may hold names such as R2 or SMR 2: the number that each ends with."""
+        out: list[float] = []
+        for row, cell in enumerate(self.cells(column)):
+            named = NAMED.fullmatch(cell) if isinstance(cell, str) else None
+            try:
+                out.append(self._number(row, column, cell) if named is None else float(named[1]))
+            except SamplesError:
+                raise SamplesError(
+                    f"{self.place(row, column)}: '{shown(str(cell), 40)}' is no number of a target; write that of its "
+                    f"[[target]] in the rig file, or --columns \"'{shown(self.headings[column], 40)}' = unused\""
+                ) from None
+        return out
 
     def _number(self, row: int, column: int, cell: Raw) -> float:
         if cell is None:

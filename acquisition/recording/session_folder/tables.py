@@ -112,8 +112,8 @@ def _pyarrow(module: str) -> Any:
     return importlib.import_module(module)
 
 
-def read_csv(path: Path | str, rig: Rig) -> Samples:
-    """The samples of a CSV file (UTF-8, header row, commas, empty = missing).
+def read_csv(path: Path | str, rig: Rig, *, joints_needed: bool = True) -> Samples:
+    """The samples of a CSV file (UTF-8, header row, commas, empty = missing); without joints where none is needed.
 
     SamplesError naming file, row, column, value and remedy.
     """
@@ -121,10 +121,10 @@ def read_csv(path: Path | str, rig: Rig) -> Samples:
         text = table_bytes(path, "samples", SamplesError).decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise SamplesError(f"{path}: byte {error.start} is not UTF-8; save the file as UTF-8") from error
-    return parse_csv(text, str(path), rig)
+    return parse_csv(text, str(path), rig, joints_needed=joints_needed)
 
 
-def parse_csv(text: str, name: str, rig: Rig) -> Samples:
+def parse_csv(text: str, name: str, rig: Rig, *, joints_needed: bool = True) -> Samples:
     """The samples of a CSV text; `name` stands for the file in errors. SamplesError as for `read_csv`."""
     lines: list[int] = []
     columns: dict[str, list[Cell]] = {}
@@ -144,7 +144,7 @@ def parse_csv(text: str, name: str, rig: Rig) -> Samples:
     def place(row: int | None) -> str:
         return name if row is None else f"{name} row {row + 1} (line {lines[row]})"
 
-    return checked_samples(columns, rig, place)
+    return checked_samples(columns, rig, place, joints_needed=joints_needed)
 
 
 def write_csv(samples: Samples, path: Path) -> None:

@@ -55,7 +55,7 @@ from calibrate.parameters import Parameter, plausible_sizes, start_values
 from calibrate.physics.known import ANEW, Known
 from calibrate.predict import Predictor, predict
 from calibrate.rigid import inverse
-from calibrate.sensors import seat, wire
+from calibrate.sensors import seat, target, wire
 
 Floats = NDArray[np.float64]
 
@@ -310,7 +310,7 @@ def _values(simulated: Simulated, session: Session) -> Floats:
     for i, p in enumerate(session.parameters):
         what, _, axis = p.name.partition(".")
         out[i] = values.get(p.name, out[i])
-        if axis in AXES and what in there and what in here and what.startswith(("tool", seat.POINTS)):
+        if axis in AXES and what in there and what in here and what.startswith(("tool", target.TARGETS, seat.POINTS)):
             out[i] += there[what][AXES.index(axis)] - here[what][AXES.index(axis)]
     return out
 

@@ -20,7 +20,7 @@ from calibrate.alignment import align
 from calibrate.arms.catalogue import arm_of
 from calibrate.diagnose.compare.seated import LENGTH, bar_differences, is_seated, tip_differences
 from calibrate.errors import DataError
-from calibrate.predict import NOWHERE, Predictor, predict
+from calibrate.predict import Predictor, predict
 from calibrate.sensors import bar, position, seat, wire
 
 Floats = NDArray[np.float64]
@@ -118,7 +118,7 @@ def _predicted(model: Predictor, pair: Pair, names: tuple[str, ...]) -> Floats:
 
 
 def _position(model: Predictor, pair: Pair) -> Floats:
-    tips = [model.tip_m(one.joints()) for one in pair]
+    tips = [position.seen_at(model, model.flange(one.joints()), one) for one in pair]
     return (tips[0] - tips[1]) @ device_of(model, pair[1])[:3, :3]
 
 
@@ -153,8 +153,8 @@ def device_of(model: Predictor, simulated: Samples) -> Floats:
         raise DataError(f"rig {rig.name}: no [device] and {good.sum()} positions; three are needed to find it")
     arm = arm_of(rig)
     flange = arm.flange(np.zeros(len(arm.parameters)), simulated.joints())
-    point = np.array(rig.tool.point_m if rig.tool.point_m is not None else NOWHERE[:3])
-    tips = flange[:, :3, :3] @ point + flange[:, :3, 3]
+    tips = position.seen_at(model, flange, simulated)
+    good &= np.all(np.isfinite(tips), axis=1)
     return align(tips[good], seen[good]).T_a_b
 
 

@@ -18,7 +18,7 @@ from calibrate.diagnose.visible import blind
 from calibrate.effects.since_model import RECORDING
 from calibrate.effects.term import Shape
 from calibrate.parameters import Parameter, plausible_sizes
-from calibrate.sensors import seat
+from calibrate.sensors import seat, target
 from calibrate.sensors.dual_psd import GAINS
 
 Floats = NDArray[np.float64]
@@ -31,6 +31,7 @@ TURNS = ("roll", "pitch", "yaw")
 # Owner of parameters -> port and physics, as of a diagnosis beside a model (calibrate/effects/since_model.py).
 FRAMES = {
     "tool": ("tool.point", "tool-moved"),
+    target.TARGETS: ("tool.point", "tool-moved"),
     "laser": ("laser.direction", "laser-moved"),
     "placement": ("fixture.pose", "fixture-moved"),
     seat.POINTS: ("seat.position", "seat-moved"),

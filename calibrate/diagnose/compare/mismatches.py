@@ -140,7 +140,7 @@ def _frame(one: Constant, *, decides: bool = True) -> Mismatch:
     sizes = dict(zip(names, one.sizes, strict=True))
     number = one.where.rpartition(" ")[2]
     what = f"{PARTS[one.physics]} {number}" if number.isdigit() else PARTS[one.physics]
-    what = what.replace("The fixture ", "The fixture at station ")
+    what = what.replace("The fixture ", "The fixture at station ").replace("on the flange ", "on the flange, number ")
     says = f"{what} stands elsewhere: {_six(sizes)}"
     parameters = () if one.physics == "device-moved" else one.names
     return Mismatch(

@@ -4,13 +4,16 @@ import msgspec
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from scipy.spatial.transform import Rotation
 
 from acquisition.recording.errors import SamplesError
 from acquisition.recording.rig.schema import FlangeTarget
 from acquisition.recording.sample_rules import checked_samples
+from calibrate.arms.catalogue import arm_of
 from calibrate.errors import DataError
-from calibrate.identification.identify import identify
+from calibrate.identification.identify import identify, wrong_file
 from calibrate.instruments import instruments_of
+from calibrate.parameters import start_values
 from calibrate.predict import Predictor, predict
 
 from .conftest import SHIFT, TOOL, TURN, changed, table
@@ -19,6 +22,7 @@ NOISE_M = 2e-5
 TRUE_M = {1: TOOL, 2: np.array([-0.071, 0.043, 0.061]), 7: np.array([0.012, -0.084, 0.072])}
 DRAWN = tuple(FlangeTarget(k, tuple(np.round(point, 2).tolist())) for k, point in TRUE_M.items())
 N = 90
+TURNED = Rotation.from_rotvec([0.0, 0.0, -0.8]).as_matrix()  # of the bracket that carries them, about the last axis
 
 
 @pytest.fixture
@@ -96,3 +100,31 @@ def test_a_row_that_names_no_target_of_the_rig_is_refused(several, drawn, cell, 
     cells["target"][4] = cell
     with pytest.raises(SamplesError, match=rf"row 4, column 'target': .*{says}"):
         checked_samples(cells, several, lambda row: f"row {row}")
+
+
+def with_a_still_wrist(session):
+    """Readings, and which target each row is of: target 1 in most, always with the last joint in one place."""
+    q, named = session.readings(N), np.resize([1, 1, 1, 2, 7], N)
+    q[named == 1, -1] = 0.4
+    return q, named
+
+
+def test_a_wrong_sign_shows_in_targets_that_were_read_less(several, session):
+    q, named = with_a_still_wrist(session)
+    points = np.array([TRUE_M[k] for k in named.tolist()])
+    seen = read_at(session, q, points, np.random.default_rng(4))
+    assert wrong_file(several, table(q, **seen, target=named.astype(float))) == ()
+    q[:, -1] *= -1.0
+    (found,) = wrong_file(several, table(q, **seen, target=named.astype(float)))
+    assert found.column == "column q6_rad"
+
+
+def test_targets_that_sit_elsewhere_than_drawn_are_no_wrong_sign_where_the_readings_fit(several, session):
+    q, named = with_a_still_wrist(session)
+    q[:, -1] = 0.4
+    turned = {k: TURNED @ DRAWN[i].point_m for i, k in enumerate(TRUE_M)}
+    arm = arm_of(several)
+    flange = arm.flange(start_values(arm.parameters), q)
+    tips = np.einsum("nij,nj->ni", flange[:, :3, :3], [turned[k] for k in named.tolist()]) + flange[:, :3, 3]
+    seen = dict(zip(("x_m", "y_m", "z_m"), TURN.inv().apply(tips - SHIFT).T, strict=True))
+    assert wrong_file(several, table(q, **seen, target=named.astype(float))) == ()
