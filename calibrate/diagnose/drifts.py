@@ -7,13 +7,12 @@ not know it. The name of such a drift has an alternative that this record cannot
 from collections.abc import Sequence
 
 from calibrate.diagnose.causes import is_slow_cause
-from calibrate.diagnose.diagnosis import UNKNOWN, Finding, Named, Unexplained
+from calibrate.diagnose.diagnosis import NOT_FINAL, UNKNOWN, Finding, Named, Unexplained
 from calibrate.effects.term import Missing, Shape
 
 SMOOTH = (Shape.EXPONENTIAL.value, Shape.LINEAR.value, Shape.SMOOTH.value)  # a step is no matter of warmth
 WARMTH, LOAD = "temp", "payload"  # drivers
 ROOM = "temp_room_degC"
-NOT_FINAL = 0.5  # confidence in the name of a drift that something else might explain
 
 
 def suspects(name: Named, missing: Sequence[Missing]) -> tuple[Missing, ...]:

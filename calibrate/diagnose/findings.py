@@ -19,9 +19,8 @@ from scipy.stats import poisson
 
 from calibrate.diagnose.bench import Bench
 from calibrate.diagnose.curve import unit_of
-from calibrate.diagnose.diagnosis import UNKNOWN, Finding, Named, RivalName
+from calibrate.diagnose.diagnosis import NAMED, NOT_FINAL, PLACED, UNKNOWN, Finding, Named, RivalName
 from calibrate.diagnose.linearised import Accepted
-from calibrate.diagnose.null import DRAWS
 from calibrate.diagnose.port_process import lever
 from calibrate.diagnose.pulled_back import pulled_back
 from calibrate.diagnose.rivals import Rival, confidences
@@ -32,12 +31,10 @@ from calibrate.effects.term import Size, Term, plain
 
 Floats = NDArray[np.float64]
 
-NOT_FINAL = 0.5  # of the confidence in a name that may be the rest of something else
 ALIKE = 1e-6  # sine between what two names can make of the readings
 FAINT = 0.05  # a name that is less likely is none
 SIGMAS = 3.0  # of a size, for a name
 NO_SIZE = ("phase", "time", "period", "degree", "order")  # words of parameters for where or when, not how much
-UNPROVED = 1.0 / (DRAWS + 1)  # of sessions with nothing in them: so many were drawn, and more is not shown by them
 LEFTOVER = 0.1  # of what an unknown cause explains: a curve may leave so much of a law that it only resembles
 
 SEVERAL = 3  # two may share a joint
@@ -149,13 +146,13 @@ def _finding(at: Search, i: int, rivals: Sequence[Rival], predicts: float) -> Fi
         name=named(a.term),
         parameters=sizes,
         share=bench.gone[i].squares,
-        confidence=float(belief[same].sum()) * (1.0 - max(p, UNPROVED)),
+        confidence=NAMED * float(belief[same].sum()) * (1.0 - p),
         p=p,
         gain=gain_of(bench.gone[i], bench.sight),
         predicts=predicts,
         says=a.term.says(sizes),
         rivals=tuple(
-            _rival(bench, a, r, float(b) * (1.0 - p))
+            _rival(bench, a, r, NAMED * float(b) * (1.0 - p))
             for r, b, own in zip(rivals, belief[1:], same[1:], strict=True)
             if not own or (r.term.order, r.term.depends_on) != (a.term.order, a.term.depends_on)
         ),
@@ -222,7 +219,7 @@ def unknown_cause(at: Search, group: Sequence[int], predicts: Floats) -> Finding
         name=Named(where, drivers, mine[0].term.shape.value, None, UNKNOWN),
         parameters={name: size},
         share=gone.squares,
-        confidence=1.0 - max(p, UNPROVED),
+        confidence=PLACED * (1.0 - p),
         p=p,
         gain=gain_of(gone, bench.sight),
         predicts=float(sum(predicts[i] for i in group)),

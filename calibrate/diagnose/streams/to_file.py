@@ -8,8 +8,7 @@ import math
 
 from msgspec.structs import replace
 
-from calibrate.diagnose.diagnosis import Named, Verdict
-from calibrate.diagnose.findings import UNPROVED
+from calibrate.diagnose.diagnosis import NAMED, Named, Verdict
 from calibrate.diagnose.schema import ClockRecord, DiagnosisFile, FindingRecord, RivalRecord, SizeRecord, StreamsRecord
 from calibrate.diagnose.streams.clock import ClockFit
 from calibrate.diagnose.streams.examine import StreamReport
@@ -56,7 +55,7 @@ def _known(one: StreamFinding, file: DiagnosisFile) -> bool:
 
 
 def _finding(one: StreamFinding) -> FindingRecord:
-    sure = 1.0 - max(one.p, UNPROVED)
+    sure = NAMED * (1.0 - one.p)
     return FindingRecord(
         *_words(one.name),
         parameters={n: SizeRecord(_number(size.value), _number(size.sigma)) for n, size in one.parameters.items()},
