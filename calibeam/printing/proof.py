@@ -10,6 +10,7 @@ from calibeam.prove.record import CaseScore, ProofFile
 from calibeam.prove.tally import (
     ProofFigure,
     TallyLine,
+    TroubleLine,
     at_once,
     between_encoders,
     by,
@@ -17,6 +18,7 @@ from calibeam.prove.tally import (
     by_enr,
     by_fault,
     by_instrument,
+    by_trouble,
     figures,
     rivals,
 )
@@ -33,6 +35,8 @@ def print_proof(console: Console, proof: ProofFile) -> None:
     console.print(_lines("faults of motion, stamps and second encoders, in streams", by_fault(cases)))
     if found := between_encoders(cases):
         console.print(_lines("between the two encoders of a joint", found))
+    if troubles := by_trouble(cases):
+        console.print(_troubles(troubles))
     console.print(_figures(cases))
     console.print(_free_space(cases))
     others = rivals(cases)
@@ -51,6 +55,17 @@ def _lines(title: str, lines: Sequence[TallyLine]) -> Table:
         if line.located.n:
             shares = (share.brief for share in line.shares)
             table.add_row(line.label, str(line.located.n), *shares, line.others)
+    return table
+
+
+def _troubles(lines: Sequence[TroubleLine]) -> Table:
+    table = Table(title="troubles that were met on real robots", title_justify="left")
+    headings = ("", "cases", "located", "named", "asks for the column", "misnamed (>= 0.5)", "false alarms")
+    for heading in headings:
+        table.add_column(heading)
+    for line in lines:
+        shares = (line.located, line.named, line.asked_for, line.misnamed, line.alarmed)
+        table.add_row(line.label, str(line.cases), *(share.brief for share in shares))
     return table
 
 

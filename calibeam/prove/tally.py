@@ -11,6 +11,7 @@ from itertools import pairwise
 import numpy as np
 from scipy.stats import binomtest
 
+from calibeam.prove.raised import SURE, TROUBLES
 from calibeam.prove.record import DIAGNOSIS, PLAIN, UNKNOWN, CaseScore, DefectScore
 
 LEVEL = 0.95
@@ -125,6 +126,19 @@ class TallyLine:
 
 
 @dataclass(frozen=True)
+class TroubleLine:
+    """One trouble of the kind `raised`: hidden causes, missing columns, and cases."""
+
+    label: str
+    cases: int
+    located: Share
+    named: Share
+    asked_for: Share  # the missing column by name, or the cause without it
+    misnamed: Share  # of cases: with a confidence of 0.5 or more
+    alarmed: Share  # of cases in which nothing is hidden
+
+
+@dataclass(frozen=True)
 class ProofFigure:
     """One number of the proof and what it should be."""
 
@@ -175,6 +189,29 @@ def between_encoders(cases: Sequence[CaseScore]) -> list[TallyLine]:
     ones = [c for c in cases if c.kind == "encoders" and c.defects]
     words = sorted({c.defects[0].mechanism for c in ones})
     return [_line(word, [c for c in ones if c.defects[0].mechanism == word]) for word in words]
+
+
+def by_trouble(cases: Sequence[CaseScore]) -> list[TroubleLine]:
+    """Of the kind `raised`; without a hidden cause each alarm is a wrong name."""
+    raised = [c for c in cases if c.trouble]
+    return [
+        _trouble_line(word, [c for c in raised if c.trouble == word])
+        for word in TROUBLES
+        if word in {c.trouble for c in raised}
+    ]
+
+
+def _trouble_line(label: str, cases: Sequence[CaseScore]) -> TroubleLine:
+    hidden = [d for c in cases for d in c.defects]
+    return TroubleLine(
+        label,
+        len(cases),
+        share(d.located for d in hidden),
+        share(d.named for d in hidden),
+        share(c.asks_for for c in cases if c.withheld),
+        share(any(s.misnamed_from(SURE) for s in c.said) for c in cases),
+        share(c.alarmed for c in cases if not c.defects),
+    )
 
 
 def by_fault(cases: Sequence[CaseScore]) -> list[TallyLine]:

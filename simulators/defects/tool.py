@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from simulators.arm.rigid import Vector, shifted, turned_about
 from simulators.arm.statics import Load
 from simulators.defects.defect import ROBOT, SPOTS, Defect, as_vector, direction
-from simulators.defects.displacement import Bump, CarriedPart
+from simulators.defects.displacement import BriefShift, Bump, CarriedPart
 from simulators.defects.scene import Scene, Site
 
 Floats = NDArray[np.float64]
@@ -198,6 +198,21 @@ class ReseatedLaser(Bump):
     TURNS_RAD_M = (1.0, 4.0)
     INSTRUMENTS = SPOTS
     ASKED = True
+
+    def tool_motion(self, scene: Scene, load: Load) -> Floats:
+        return self.motion(scene)
+
+
+@dataclass(frozen=True)
+class BrieflyShiftedLaser(BriefShift):
+    """A laser that a cable pulled aside for a while."""
+
+    KIND = "briefly-shifted-laser"
+    PHYSICS = "laser-moved"
+    PORT = "laser.direction"
+    TYPICAL = 4e-5
+    TURNS_RAD_M = (1.0, 4.0)
+    INSTRUMENTS = SPOTS
 
     def tool_motion(self, scene: Scene, load: Load) -> Floats:
         return self.motion(scene)

@@ -7,7 +7,7 @@ import pytest
 from calibeam.prove.misses import faults
 from calibeam.prove.page import ELSEWHERE, confusion
 from calibeam.prove.record import CaseScore, DefectScore, NamedCause, SizeScore
-from calibeam.prove.tally import Share, by_effect, by_enr, figures, plain, share
+from calibeam.prove.tally import Share, by_effect, by_enr, by_trouble, figures, plain, share
 
 Case = Callable[..., CaseScore]
 Found = Callable[..., DefectScore]
@@ -102,3 +102,16 @@ def test_the_confusion_matrix_has_right_answers_on_its_diagonal(case: Case, foun
     assert counts[0, said.index("reading-lag")] == 1
     assert counts[1, said.index("nothing")] == 1
     assert counts.sum() == len(cases)
+
+
+def test_troubles_count_causes_alarms_and_wrong_names_of_half_confidence(case: Case, found: Found) -> None:
+    spot = "detector-local-defect"
+    cases = [
+        case((found(named=False),), trouble=spot),
+        case((found(located=False, named=False),), (_said(confidence=0.6),), trouble=spot),
+        case((), (_said(confidence=0.3),), trouble="room-temperature"),
+        case((found(),), (_said(),)),
+    ]
+    first, null = by_trouble(cases)
+    assert (first.label, first.cases, first.located.k, first.named.k, first.misnamed.k) == (spot, 2, 1, 0, 1)
+    assert (null.alarmed.k, null.misnamed.k, null.located.n) == (1, 0, 0)
