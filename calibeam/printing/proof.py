@@ -8,9 +8,10 @@ from calibeam.console import Console
 from calibeam.prove.real import HiddenAngle, RealScore
 from calibeam.prove.record import CaseScore, ProofFile
 from calibeam.prove.tally import (
+    OF_TROUBLES,
     ProofFigure,
+    Share,
     TallyLine,
-    TroubleLine,
     at_once,
     between_encoders,
     by,
@@ -58,14 +59,10 @@ def _lines(title: str, lines: Sequence[TallyLine]) -> Table:
     return table
 
 
-def _troubles(lines: Sequence[TroubleLine]) -> Table:
-    table = Table(title="troubles that were met on real robots", title_justify="left")
-    headings = ("", "cases", "located", "named", "asks for the column", "misnamed (>= 0.5)", "false alarms")
-    for heading in headings:
-        table.add_column(heading)
-    for line in lines:
-        shares = (line.located, line.named, line.asked_for, line.misnamed, line.alarmed)
-        table.add_row(line.label, str(line.cases), *(share.brief for share in shares))
+def _troubles(lines: Sequence[tuple[str, tuple[Share, ...]]]) -> Table:
+    table = Table("", *OF_TROUBLES, title="troubles that were met on real robots", title_justify="left")
+    for label, (count, *shares) in lines:
+        table.add_row(label, str(count.k), *(share.brief for share in shares))
     return table
 
 

@@ -4,8 +4,8 @@ What each may be called, and where, follows from its mechanism (`simulators.defe
 in the wrong convention, and a thermometer that nothing depends on.
 """
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 from typing import Any
 
 from numpy.random import Generator
@@ -25,26 +25,20 @@ class Trouble:
     """What is hidden by instrument, one of several at random, and what else differs from other sessions."""
 
     defects: Mapping[Family, tuple[tuple[str, ...], ...]]
-    changes: Mapping[str, Any] = field(default_factory=dict[str, Any])
+    changes: Callable[[Generator], dict[str, Any]] = lambda rng: {}
 
     def wanted(self, plain: Wanted, rng: Generator) -> Wanted:
         """The session `plain` with this trouble."""
-        choices = self.defects[plain.family]
-        return replace(plain, defects=choices[int(rng.integers(len(choices)))], **self.changes)
+        choices, changes = self.defects[plain.family], self.changes(rng)
+        return replace(plain, defects=choices[int(rng.integers(len(choices)))], **changes)
 
 
-@dataclass(frozen=True)
-class _SecondEncoders(Trouble):
-    def wanted(self, plain: Wanted, rng: Generator) -> Wanted:
-        side = SIDES[int(rng.integers(len(SIDES)))]
-        return replace(super().wanted(plain, rng), encoders=side, side_stated=bool(rng.random() < 0.5))
+def _second_encoders(rng: Generator) -> dict[str, Any]:
+    return {"encoders": SIDES[int(rng.integers(len(SIDES)))], "side_stated": bool(rng.random() < 0.5)}
 
 
-@dataclass(frozen=True)
-class _DriftingThermometer(Trouble):
-    def wanted(self, plain: Wanted, rng: Generator) -> Wanted:
-        drift_k = float(rng.choice([-1.0, 1.0]) * rng.uniform(2.0, 6.0))
-        return replace(super().wanted(plain, rng), thermometer_k=drift_k)
+def _drifting(rng: Generator) -> dict[str, Any]:
+    return {"thermometer_k": float(rng.choice([-1.0, 1.0]) * rng.uniform(2.0, 6.0))}
 
 
 def _hidden(*names: str, families: tuple[Family, ...]) -> Mapping[Family, tuple[tuple[str, ...], ...]]:
@@ -63,13 +57,8 @@ TROUBLES: Mapping[str, Trouble] = {
     "temporary-shift": Trouble(
         {"dual-psd": (("briefly-shifted-base",), ("briefly-shifted-laser",)), "cones": (("briefly-shifted-base",),)}
     ),
-    "two-soft-joints-second-encoders": _SecondEncoders(_hidden("soft-joint", "soft-joint", families=DRIVEN)),
-    "confused-convention": Trouble(_hidden(families=ROBOTS), {"confused": True}),
-    "missing-column": Trouble(_hidden("any", families=DRIVEN), {"withhold": True}),
-    "room-temperature": _DriftingThermometer(_hidden(families=(*ROBOTS, "cones"))),
+    "two-soft-joints-second-encoders": Trouble(_hidden("soft-joint", "soft-joint", families=DRIVEN), _second_encoders),
+    "confused-convention": Trouble(_hidden(families=ROBOTS), lambda rng: {"confused": True}),
+    "missing-column": Trouble(_hidden("any", families=DRIVEN), lambda rng: {"withhold": True}),
+    "room-temperature": Trouble(_hidden(families=(*ROBOTS, "cones")), _drifting),
 }
-
-
-def trouble_of(number: int) -> str:
-    """Which one case `number` has: each in turn."""
-    return tuple(TROUBLES)[number % len(TROUBLES)]

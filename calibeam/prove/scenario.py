@@ -12,7 +12,7 @@ from typing import Literal, TypeVar, get_args
 import numpy as np
 from numpy.random import Generator
 
-from calibeam.prove.raised import TROUBLES, trouble_of
+from calibeam.prove.raised import TROUBLES
 from simulators.conceal.wanted import FAMILIES, SIDES, Family, Wanted
 from simulators.conceal.wanted import Kind as Noise
 
@@ -100,7 +100,7 @@ def scenario(mix: Mix, seed: int, number: int, attempt: int) -> Scenario:
     """Case `number` of a proof. An attempt of a case that could not be drawn keeps its kind, family and size."""
     rng = np.random.default_rng([seed, number])
     kind = _one_of(mix.kinds, [mix.shares[k] for k in mix.kinds], rng)
-    trouble = (mix.mechanism or trouble_of(number)) if kind == "raised" else ""
+    trouble = (mix.mechanism or tuple(TROUBLES)[number % len(TROUBLES)]) if kind == "raised" else ""
     families = _able(mix.families, tuple(TROUBLES[trouble].defects)) if trouble else _able_of(mix.families, kind)
     family = _one_of(families, [FAMILY_SHARES[f] for f in families], rng)
     low, high = mix.enr or ENR_OF.get(kind, ENR)

@@ -50,12 +50,8 @@ def _one_stand(true: str, said: str, family: str) -> bool:
     return {true, said} == {"base.pose", "device.pose"} and family in ("tracker", "wire")
 
 
-def _each_station(true: str, said: str, family: str) -> bool:
-    return true in ALL_STATIONS and said == true.replace("*", "")
-
-
-def _base_or_stations(true: str, said: str, family: str) -> bool:
-    return true in ALL_STATIONS and said == "base.pose"
+def _one_body(true: str, said: str, family: str) -> bool:
+    return true in ALL_STATIONS and said in ("base.pose", true.replace("*", ""))
 
 
 ALL_STATIONS = ("fixture*.pose", "seat*.position")
@@ -66,9 +62,8 @@ RULES = (
         "one device watches the arm: the base moved one way or the device the other way is the same to every reading",
         frozenset({"base-moved", "device-drift"}),
     ),
-    Rule(_each_station, "all stations, or all cones, moved as one body: whichever is named, the whole is meant"),
     Rule(
-        _base_or_stations,
+        _one_body,
         "all that watches the arm moved as one body: the base moved the other way is the same to every reading",
         frozenset({"base-moved", "fixture-moved", "seat-moved"}),
     ),
@@ -173,9 +168,8 @@ def score(layout: Layout, concealed: Concealed, answered: Answered, truth: Truth
     file = None if answered.error else read_diagnosis(layout.answer(drawn.name) / "diagnosis.json")
     own = _own(truth.defects, () if file is None else file.findings, wanted.family)
     left = _left_over(file)
-    nameless = bool(drawn.trouble)  # some of the troubles are in no catalogue yet
     defects = tuple(
-        _defect(d, findings, left if nameless or d.physics == UNKNOWN else (), wanted.family)
+        _defect(d, findings, left if drawn.trouble or d.physics == UNKNOWN else (), wanted.family)
         for d, findings in zip(truth.defects, own, strict=True)
     )
     if drawn.wanted.confused and _names_convention(file, answered.error):

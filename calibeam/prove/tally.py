@@ -126,19 +126,6 @@ class TallyLine:
 
 
 @dataclass(frozen=True)
-class TroubleLine:
-    """One trouble of the kind `raised`: hidden causes, missing columns, and cases."""
-
-    label: str
-    cases: int
-    located: Share
-    named: Share
-    asked_for: Share  # the missing column by name, or the cause without it
-    misnamed: Share  # of cases: with a confidence of 0.5 or more
-    alarmed: Share  # of cases in which nothing is hidden
-
-
-@dataclass(frozen=True)
 class ProofFigure:
     """One number of the proof and what it should be."""
 
@@ -191,21 +178,20 @@ def between_encoders(cases: Sequence[CaseScore]) -> list[TallyLine]:
     return [_line(word, [c for c in ones if c.defects[0].mechanism == word]) for word in words]
 
 
-def by_trouble(cases: Sequence[CaseScore]) -> list[TroubleLine]:
-    """Of the kind `raised`; without a hidden cause each alarm is a wrong name."""
+OF_TROUBLES = ("cases", "located", "named", "asks for the column", "misnamed (>= 0.5)", "false alarms")
+
+
+def by_trouble(cases: Sequence[CaseScore]) -> list[tuple[str, tuple[Share, ...]]]:
+    """Of the kind `raised`, one line each: its name, and shares as in OF_TROUBLES; the first of all such cases."""
     raised = [c for c in cases if c.trouble]
-    return [
-        _trouble_line(word, [c for c in raised if c.trouble == word])
-        for word in TROUBLES
-        if word in {c.trouble for c in raised}
-    ]
+    each = [(word, [c for c in raised if c.trouble == word]) for word in TROUBLES]
+    return [(word, _shares_of_trouble(mine, len(raised))) for word, mine in each if mine]
 
 
-def _trouble_line(label: str, cases: Sequence[CaseScore]) -> TroubleLine:
+def _shares_of_trouble(cases: Sequence[CaseScore], all_cases: int) -> tuple[Share, ...]:
     hidden = [d for c in cases for d in c.defects]
-    return TroubleLine(
-        label,
-        len(cases),
+    return (
+        Share(len(cases), all_cases),
         share(d.located for d in hidden),
         share(d.named for d in hidden),
         share(c.asks_for for c in cases if c.withheld),

@@ -264,8 +264,7 @@ def conceal(wanted: Wanted) -> Case:
     kinds = choose(wanted, hide_rng) if wanted.encoders is None else ()
     habits = draw_habits(wanted, kinds, plan_rng)
     table = draw_timetable(wanted, drawn.true, habits, plan_rng)
-    if wanted.thermometer_k:
-        table = replace(table, scene=_with_drifting_thermometer(table.scene, wanted.thermometer_k))
+    table = replace(table, scene=_with_drifting_thermometer(table.scene, wanted.thermometer_k))
     posture_rad = table.scene.goal_rad
     sigma_m = SIGMA[wanted.family] * float(plan_rng.uniform(0.7, 1.4))
     distances = measure_distances(drawn.true, plan_rng)

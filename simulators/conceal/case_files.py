@@ -77,15 +77,8 @@ def _convention(case: Case) -> dict[str, Any]:
         for fixed in (fixed_parts(case.drawn.drawing), arm.fixed)
     )
     off_m = float(np.sqrt(np.mean((stated - true) ** 2)))
-    return {
-        "mechanism": "confused-convention",
-        "physics": "rig-convention",
-        "port": "arm.model",
-        "drivers": [],
-        "fields": {"stated": case.drawn.drawing.model},
-        "figures": {},
-        "enr": off_m / case.sigma_m,
-    }
+    named = {"mechanism": "confused-convention", "physics": "rig-convention", "port": "arm.model"}
+    return named | {"drivers": [], "figures": {}, "enr": off_m / case.sigma_m}
 
 
 def _rig(rig: TrueRig) -> dict[str, Any]:

@@ -113,8 +113,7 @@ def timetable(
     order = np.lexsort((lot, stay))
     row, stay = taken[order], stay[order]
     scene = _scene(_times(stay, habits, rng), pose_rad[row], place[row], first_psd[row], seat[row], habits, rng)
-    stays_s = () if habits.in_turns else _stay_times(place[row], stay, scene.t_s)
-    return Timetable(row, group[row], scene, stays_s)
+    return Timetable(row, group[row], scene, _stay_times(place[row], stay, scene.t_s))
 
 
 def _scene(

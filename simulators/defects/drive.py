@@ -160,7 +160,7 @@ class SlackDrive(DriveDefect):
 
     def turn_rad(self, shaft_rad: Floats, scene: Scene, load: Load) -> Floats:
         column = self.joint - 1
-        return played(scene.via_rad[:, column], scene.goal_rad[:, column], self.play_rad)
+        return played(np.stack((scene.via_rad[:, column], scene.goal_rad[:, column]), axis=1), self.play_rad)
 
 
 @dataclass(frozen=True)
@@ -192,22 +192,20 @@ class SlackUnderWeight(DriveDefect):
         return 0.5 * self.play_rad * lean
 
 
-def played(via_rad: Floats, goal_rad: Floats, play_rad: float) -> Floats:
-    """Driven less driving side at the goal of each row, (row,), for one joint, with the history of the motion.
+def played(way: Floats, play: float) -> Floats:
+    """Driven less driving side at the end of each row, (row,), with the history of the motion, in the unit of `way`.
 
     The play operator (Visintin, "Differential Models of Hysteresis", 1994, section III.2): the driven side stays where
-    it is until one flank of the driving side meets it, w <- min(max(w, u - b/2), u + b/2). The driving side goes from
-    goal to `via_rad` and on to the next `goal_rad`, both (row,), row by row; the driven side first stands in the
-    middle.
+    it is until one flank of the driving side meets it, w <- min(max(w, u - b/2), u + b/2). The driving side goes along
+    `way` (row, step), row by row; the driven side first stands in the middle.
     """
-    half_rad = 0.5 * play_rad
-    driven_rad = via_rad[0]
-    behind_rad = np.empty_like(goal_rad)
-    for row, (via, goal) in enumerate(zip(via_rad.tolist(), goal_rad.tolist(), strict=True)):
-        for driving in (via, goal):
-            driven_rad = min(max(driven_rad, driving - half_rad), driving + half_rad)
-        behind_rad[row] = driven_rad - goal
-    return behind_rad
+    half, driven = 0.5 * play, float(way[0, 0])
+    behind = np.empty(len(way))
+    for row, steps in enumerate(way.tolist()):
+        for driving in steps:
+            driven = min(max(driven, driving - half), driving + half)
+        behind[row] = driven - steps[-1]
+    return behind
 
 
 # --- compliance
@@ -338,15 +336,9 @@ class HystereticSpring(SoftJoint):
         return cls(joint, cls.draw_size(rng), tuple(float(value) for value in thresholds_nm))
 
     def turn_rad(self, shaft_rad: Floats, scene: Scene, load: Load) -> Floats:
-        way_nm = self._on_the_way_nm(scene, load).tolist()
-        trailing_nm = np.zeros((len(self.thresholds_nm), len(scene)))
-        for operator, half_nm in enumerate(self.thresholds_nm):
-            state_nm = way_nm[0][0]
-            for row, torques_nm in enumerate(way_nm):
-                for torque_nm in torques_nm:
-                    state_nm = min(max(state_nm, torque_nm - half_nm), torque_nm + half_nm)
-                trailing_nm[operator, row] = state_nm
-        return self.compliance_rad_nm * trailing_nm.mean(axis=0)
+        way_nm = self._on_the_way_nm(scene, load)
+        behind_nm = np.mean([played(way_nm, 2.0 * half_nm) for half_nm in self.thresholds_nm], axis=0)
+        return self.compliance_rad_nm * (way_nm[:, -1] + behind_nm)
 
     def _on_the_way_nm(self, scene: Scene, load: Load) -> Floats:
         """(row, step) torque of gravity on the way to each sample; deflections of 1e-4 rad change none of it."""

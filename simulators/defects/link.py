@@ -221,17 +221,14 @@ class LaggingLink(HeatedLink):
         return cls(site.long_link(rng), cls.draw_size(rng), "", float(rng.uniform(900.0, 2700.0)))
 
     def link_motion(self, link: int, end_m: Floats, angle_rad: Floats, scene: Scene, load: Load) -> Floats:
-        skin_k = scene.warmed_k(self.where or f"link{link}")
-        return shifted(self.expansion_per_k * self._inside_k(scene.t_s, skin_k)[:, np.newaxis] * end_m)
-
-    def _inside_k(self, t_s: Floats, skin_k: Floats) -> Floats:
+        t_s, skin_k = scene.t_s, scene.warmed_k(self.where or f"link{link}")
         inside_k = skin_k.copy()
         for row in range(1, t_s.size):
-            step_s, rise_k = t_s[row] - t_s[row - 1], skin_k[row] - skin_k[row - 1]
+            step_s = max(t_s[row] - t_s[row - 1], 1e-9)
             keep = np.exp(-step_s / self.time_constant_s)
-            behind_k = rise_k * self.time_constant_s / step_s if step_s > 0.0 else 0.0
+            behind_k = (skin_k[row] - skin_k[row - 1]) * self.time_constant_s / step_s
             inside_k[row] = skin_k[row] - behind_k + (inside_k[row - 1] - skin_k[row - 1] + behind_k) * keep
-        return inside_k
+        return shifted(self.expansion_per_k * inside_k[:, np.newaxis] * end_m)
 
 
 @dataclass(frozen=True)

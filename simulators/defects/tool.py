@@ -204,15 +204,7 @@ class ReseatedLaser(Bump):
 
 
 @dataclass(frozen=True)
-class BrieflyShiftedLaser(BriefShift):
+class BrieflyShiftedLaser(BriefShift, ReseatedLaser):
     """A laser that a cable pulled aside for a while."""
 
     KIND = "briefly-shifted-laser"
-    PHYSICS = "laser-moved"
-    PORT = "laser.direction"
-    TYPICAL = 4e-5
-    TURNS_RAD_M = (1.0, 4.0)
-    INSTRUMENTS = SPOTS
-
-    def tool_motion(self, scene: Scene, load: Load) -> Floats:
-        return self.motion(scene)

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from calibeam.prove.raised import TROUBLES, trouble_of
+from calibeam.prove.raised import TROUBLES
 from calibeam.prove.scenario import Mix, Scenario, scenario
 from simulators.conceal.case import Case, conceal
 from simulators.conceal.case_files import columns, truth_document
@@ -30,7 +30,6 @@ def test_each_trouble_has_its_turn_and_a_family_that_can_show_it() -> None:
     drawn = [scenario(Mix(kinds=("raised",)), 1, number, 0) for number in range(2 * COUNT)]
     assert [one.trouble for one in drawn] == [*TROUBLES, *TROUBLES]
     assert all(one.wanted.family in TROUBLES[one.trouble].defects for one in drawn)
-    assert trouble_of(COUNT) == trouble_of(0)
 
 
 def test_a_family_that_cannot_show_a_trouble_gives_way() -> None:

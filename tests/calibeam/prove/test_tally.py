@@ -112,6 +112,7 @@ def test_troubles_count_causes_alarms_and_wrong_names_of_half_confidence(case: C
         case((), (_said(confidence=0.3),), trouble="room-temperature"),
         case((found(),), (_said(),)),
     ]
-    first, null = by_trouble(cases)
-    assert (first.label, first.cases, first.located.k, first.named.k, first.misnamed.k) == (spot, 2, 1, 0, 1)
-    assert (null.alarmed.k, null.misnamed.k, null.located.n) == (1, 0, 0)
+    [(label, first), (other, null)] = by_trouble(cases)
+    assert (label, other) == (spot, "room-temperature")
+    assert [share.k for share in first] == [2, 1, 0, 0, 1, 0]
+    assert [(share.k, share.n) for share in null] == [(1, 3), (0, 0), (0, 0), (0, 0), (0, 1), (1, 1)]

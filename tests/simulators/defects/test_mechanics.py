@@ -45,7 +45,7 @@ def test_play_keeps_the_side_it_came_from_and_forgets_no_small_move() -> None:
     play_rad = 0.1
     via_rad = np.array([0.0, 0.0, 1.02, 0.5])
     goal_rad = np.array([1.0, 0.98, 1.0, 1.0])
-    behind_rad = played(via_rad, goal_rad, play_rad)
+    behind_rad = played(np.stack((via_rad, goal_rad), axis=1), play_rad)
     # up to 1: half the play behind; back to 0, up to 0.98: behind again; up to 1.02 and 0.02 back: still held at 0.97;
     # down to 0.5 and up to 1: behind
     np.testing.assert_allclose(behind_rad, [-0.05, -0.05, -0.03, -0.05], atol=1e-12)
