@@ -264,13 +264,13 @@ class TwoSlopeFlexspline(SoftJoint):
 
 @dataclass(frozen=True)
 class OneSidedSpring(SoftJoint):
-    """A drive that is `stiffer` (no unit) times as soft in one sense as in the other.
+    """A drive that is stiffer in one sense: for negative torques it yields `share_back` (no unit) of its compliance.
 
-    One flank of each tooth is worn, or a preloaded pair of pinions: turn = compliance x torque for positive torques,
-    and `stiffer` of that for negative ones.
+    One flank of each tooth is worn, or a pair of pinions is preloaded: turn = compliance x torque for positive torques,
+    and that share of it for negative ones.
     """
 
-    stiffer: float
+    share_back: float
 
     KIND = "one-sided-spring"
     TYPICAL = 6e-6
@@ -284,7 +284,7 @@ class OneSidedSpring(SoftJoint):
 
     def turn_rad(self, shaft_rad: Floats, scene: Scene, load: Load) -> Floats:
         torque_nm = load.torque_nm[:, self.joint - 1]
-        return self.compliance_rad_nm * np.where(torque_nm > 0.0, torque_nm, self.stiffer * torque_nm)
+        return self.compliance_rad_nm * np.where(torque_nm > 0.0, torque_nm, self.share_back * torque_nm)
 
 
 @dataclass(frozen=True)
