@@ -11,6 +11,7 @@ from calibeam.console import Console
 from calibeam.printing.proof import print_proof, print_real
 from calibeam.prove.loop import prove_loop, summary
 from calibeam.prove.prove import Plan, ending_early, fresh, prove
+from calibeam.prove.raised import TROUBLES
 from calibeam.prove.real import prove_real, write_real_page
 from calibeam.prove.scenario import DEVELOPMENT, KINDS, Kind, Mix
 from calibeam.software import SOFTWARE
@@ -65,7 +66,8 @@ def prove_command(
     enr
         Smallest and largest effect over noise.
     mechanism
-        One mechanism by name, in cases with one effect (python -m simulators.conceal --list).
+        One mechanism by name, in cases with one effect (python -m simulators.conceal --list); a trouble by name, in
+        cases of the kind `raised`.
     jobs
         Processes at a time.
     without
@@ -94,6 +96,8 @@ def prove_command(
         return
     seed = seed if seed is not None else PUBLISHED_SEED if publish else DEVELOPED_SEED
     mix = Mix(kind, family, enr, mechanism)
+    if "raised" in kind and mechanism is not None and mechanism not in TROUBLES:
+        raise DataError(f"--mechanism {mechanism}: no trouble of the kind raised; there are {', '.join(TROUBLES)}")
     if publish and seed < DEVELOPMENT:
         raise DataError(f"seed {seed} is reserved for development; publish with --seed {DEVELOPMENT} or above")
     if publish and without:

@@ -8,7 +8,9 @@ from calibeam.console import Console
 from calibeam.prove.real import HiddenAngle, RealScore
 from calibeam.prove.record import CaseScore, ProofFile
 from calibeam.prove.tally import (
+    OF_TROUBLES,
     ProofFigure,
+    Share,
     TallyLine,
     at_once,
     between_encoders,
@@ -17,6 +19,7 @@ from calibeam.prove.tally import (
     by_enr,
     by_fault,
     by_instrument,
+    by_trouble,
     figures,
     rivals,
 )
@@ -33,6 +36,8 @@ def print_proof(console: Console, proof: ProofFile) -> None:
     console.print(_lines("faults of motion, stamps and second encoders, in streams", by_fault(cases)))
     if found := between_encoders(cases):
         console.print(_lines("between the two encoders of a joint", found))
+    if troubles := by_trouble(cases):
+        console.print(_troubles(troubles))
     console.print(_figures(cases))
     console.print(_free_space(cases))
     others = rivals(cases)
@@ -51,6 +56,13 @@ def _lines(title: str, lines: Sequence[TallyLine]) -> Table:
         if line.located.n:
             shares = (share.brief for share in line.shares)
             table.add_row(line.label, str(line.located.n), *shares, line.others)
+    return table
+
+
+def _troubles(lines: Sequence[tuple[str, tuple[Share, ...]]]) -> Table:
+    table = Table("", *OF_TROUBLES, title="troubles that were met on real robots", title_justify="left")
+    for label, (count, *shares) in lines:
+        table.add_row(label, str(count.k), *(share.brief for share in shares))
     return table
 
 

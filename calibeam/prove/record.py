@@ -63,7 +63,11 @@ class NamedCause(ProofRecord, frozen=True):
     @property
     def misnamed(self) -> bool:
         """A name of physics, reported as certain, for what was not hidden there."""
-        return self.physics != UNKNOWN and self.confidence >= CONFIDENT and not self.right
+        return self.misnamed_from(CONFIDENT)
+
+    def misnamed_from(self, confidence: float) -> bool:
+        """The same with this confidence or more."""
+        return self.physics != UNKNOWN and self.confidence >= confidence and not self.right
 
 
 class BaselineScore(ProofRecord, frozen=True):
@@ -106,6 +110,7 @@ class CaseScore(ProofRecord, frozen=True):
     oracle_free_space_m: float | None = None
     baselines: tuple[BaselineScore, ...] = ()
     path: str = "in process"  # or "on wires": how the recording came about
+    trouble: str = ""  # of the kind `raised`
 
     @property
     def alarmed(self) -> bool:
@@ -144,6 +149,7 @@ class TrueDefect(msgspec.Struct, frozen=True):
     drivers: tuple[str, ...]
     figures: dict[str, float]
     enr: float  # effect over noise, after geometry
+    also: tuple[str, ...] = ()  # physics that is truly at this port, too: no wrong name, but not the whole cause
 
 
 class TrueNoise(msgspec.Struct, frozen=True):

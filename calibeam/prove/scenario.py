@@ -12,13 +12,15 @@ from typing import Literal, TypeVar, get_args
 import numpy as np
 from numpy.random import Generator
 
+from calibeam.prove.raised import TROUBLES
 from simulators.conceal.wanted import FAMILIES, SIDES, Family, Wanted
 from simulators.conceal.wanted import Kind as Noise
 
 T = TypeVar("T")
 Path = Literal["in process", "on wires"]  # how the recording comes about
-Kind = Literal["one", "disturbed", "three", "eighteen", "none", "outside", "withheld", "streams", "encoders"]
-KINDS: tuple[Kind, ...] = tuple(k for k in get_args(Kind) if k != "encoders")  # of a proof that names none
+Kind = Literal["one", "disturbed", "three", "eighteen", "none", "outside", "withheld", "streams", "encoders", "raised"]
+ON_REQUEST: tuple[Kind, ...] = ("encoders", "raised")
+KINDS: tuple[Kind, ...] = tuple(k for k in get_args(Kind) if k not in ON_REQUEST)  # of a proof that names none
 SHARES: dict[Kind, float] = {
     "one": 0.42,
     "disturbed": 0.06,  # one effect under heavy-tailed noise with outliers, or slowly wandering noise
@@ -28,6 +30,7 @@ SHARES: dict[Kind, float] = {
     "outside": 0.15,
     "withheld": 0.08,
     "encoders": 0.1,  # something of machine-like size between the two encoders of a joint, or nothing; on request
+    "raised": 0.1,  # troubles that were met on real robots, in turns; on request
     "streams": 0.05,  # nothing wrong with the chain; with motion, stamps or second encoders, in three of four
 }
 FAMILY_SHARES: dict[Family, float] = {"dual-psd": 0.5, "tracker": 0.25, "cones": 0.125, "wire": 0.125}
@@ -41,6 +44,7 @@ DEFECTS: dict[Kind, tuple[str, ...]] = {
     "withheld": ("any",),
     "streams": (),
     "encoders": ("any",),
+    "raised": (),  # each trouble has its own
 }
 ENR = (0.15, 8.0)  # effect over noise: from hardly there to plain
 ENR_OF: dict[Kind, tuple[float, float]] = {  # one that must be noticed before it can be named
@@ -48,6 +52,7 @@ ENR_OF: dict[Kind, tuple[float, float]] = {  # one that must be noticed before i
     "eighteen": (0.6, 3.0),
     "outside": (0.6, 5.0),
     "withheld": (0.6, 5.0),
+    "raised": (1.0, 6.0),
 }
 SAMPLES = (160, 400)
 MANY_SAMPLES = 400  # of a session with eighteen effects: each has several parameters
@@ -71,7 +76,7 @@ class Mix:
     kinds: Sequence[Kind] = KINDS
     families: Sequence[Family] = FAMILIES
     enr: tuple[float, float] | None = None  # None: as each kind has it
-    mechanism: str | None = None  # one by name, for kinds with one effect
+    mechanism: str | None = None  # one by name, for kinds with one effect; a trouble, for the kind of these
     shares: Mapping[Kind, float] = field(default_factory=lambda: SHARES)
 
     def defects(self, kind: Kind) -> tuple[str, ...]:
@@ -88,13 +93,15 @@ class Scenario:
     kind: Kind
     wanted: Wanted
     path: Path = "in process"
+    trouble: str = ""  # of the kind `raised`
 
 
 def scenario(mix: Mix, seed: int, number: int, attempt: int) -> Scenario:
     """Case `number` of a proof. An attempt of a case that could not be drawn keeps its kind, family and size."""
     rng = np.random.default_rng([seed, number])
     kind = _one_of(mix.kinds, [mix.shares[k] for k in mix.kinds], rng)
-    families = _able(mix.families, kind)
+    trouble = (mix.mechanism or tuple(TROUBLES)[number % len(TROUBLES)]) if kind == "raised" else ""
+    families = _able(mix.families, tuple(TROUBLES[trouble].defects)) if trouble else _able_of(mix.families, kind)
     family = _one_of(families, [FAMILY_SHARES[f] for f in families], rng)
     low, high = mix.enr or ENR_OF.get(kind, ENR)
     few, most = STREAMED_SAMPLES if kind == "streams" else SAMPLES
@@ -110,7 +117,9 @@ def scenario(mix: Mix, seed: int, number: int, attempt: int) -> Scenario:
     )
     if kind == "encoders":
         wanted = _with_encoders(wanted, rng)
-    return Scenario(f"case-{number:04d}", kind, wanted)
+    if trouble:
+        wanted = TROUBLES[trouble].wanted(wanted, rng)
+    return Scenario(f"case-{number:04d}", kind, wanted, trouble=trouble)
 
 
 def wired_scenario(mix: Mix, seed: int, number: int, attempt: int) -> Scenario:
@@ -140,7 +149,7 @@ def _with_encoders(wanted: Wanted, rng: Generator) -> Wanted:
     )
 
 
-def _able(families: Sequence[Family], kind: Kind) -> Sequence[Family]:
+def _able_of(families: Sequence[Family], kind: Kind) -> Sequence[Family]:
     """Eighteen effects have room in a session with two detectors only, which alone leave streams of spots.
 
     Cones have next to no column to withhold.
@@ -152,7 +161,10 @@ def _able(families: Sequence[Family], kind: Kind) -> Sequence[Family]:
         "encoders": ("dual-psd", "tracker", "wire"),
     }
     wide: tuple[Family, ...] = FAMILIES
-    possible = narrow.get(kind, wide)
+    return _able(families, narrow.get(kind, wide))
+
+
+def _able(families: Sequence[Family], possible: Sequence[Family]) -> Sequence[Family]:
     return [f for f in families if f in possible] or list(possible)
 
 

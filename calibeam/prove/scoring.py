@@ -16,6 +16,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from msgspec.structs import replace
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 from scipy.spatial.transform import Rotation
@@ -24,6 +25,7 @@ from acquisition.recording import Samples, read
 from acquisition.recording.samples import POSITION, SPOTS
 from calibeam.prove.concealing import Concealed
 from calibeam.prove.diagnosing import Answered
+from calibeam.prove.raised import SAID_OF_CONVENTION
 from calibeam.prove.record import UNKNOWN, CaseScore, DefectScore, FreeSpace, NamedCause, SizeScore, TrueDefect, Truth
 from calibeam.prove.seal import Layout
 from calibeam.prove.unseen import LaserBeam, Tool, read_unseen
@@ -48,12 +50,22 @@ def _one_stand(true: str, said: str, family: str) -> bool:
     return {true, said} == {"base.pose", "device.pose"} and family in ("tracker", "wire")
 
 
+def _one_body(true: str, said: str, family: str) -> bool:
+    return true in ALL_STATIONS and said in ("base.pose", true.replace("*", ""))
+
+
+ALL_STATIONS = ("fixture*.pose", "seat*.position")
 RULES = (
     Rule(_all_links, "all links grow together: whichever is named, the growth of the arm is meant"),
     Rule(
         _one_stand,
         "one device watches the arm: the base moved one way or the device the other way is the same to every reading",
         frozenset({"base-moved", "device-drift"}),
+    ),
+    Rule(
+        _one_body,
+        "all that watches the arm moved as one body: the base moved the other way is the same to every reading",
+        frozenset({"base-moved", "fixture-moved", "seat-moved"}),
     ),
 )
 
@@ -156,7 +168,12 @@ def score(layout: Layout, concealed: Concealed, answered: Answered, truth: Truth
     file = None if answered.error else read_diagnosis(layout.answer(drawn.name) / "diagnosis.json")
     own = _own(truth.defects, () if file is None else file.findings, wanted.family)
     left = _left_over(file)
-    defects = tuple(_defect(d, findings, left, wanted.family) for d, findings in zip(truth.defects, own, strict=True))
+    defects = tuple(
+        _defect(d, findings, left if drawn.trouble or d.physics == UNKNOWN else (), wanted.family)
+        for d, findings in zip(truth.defects, own, strict=True)
+    )
+    if drawn.wanted.confused and _names_convention(file, answered.error):
+        defects = tuple(replace(d, located=True, named=True, among_rivals=True) for d in defects)
     before_m, after_m = _free_space(layout.answer(drawn.name), truth)
     return CaseScore(
         name=drawn.name,
@@ -183,7 +200,14 @@ def score(layout: Layout, concealed: Concealed, answered: Answered, truth: Truth
         cpu_s=answered.cpu_s,
         error=answered.error,
         path=drawn.path,
+        trouble=drawn.trouble,
     )
+
+
+def _names_convention(file: DiagnosisFile | None, error: str) -> bool:
+    """Whether the recording was refused, or a fault of its files is reported, for the convention of the table."""
+    reported = [error] if file is None else [b.says for b in file.blunders]
+    return any(word in text.lower() for text in reported for word in SAID_OF_CONVENTION)
 
 
 def _own(
@@ -220,8 +244,8 @@ def _left_over(file: DiagnosisFile | None) -> tuple[str, ...]:
 
 
 def _defect(defect: TrueDefect, findings: Sequence[FindingRecord], left: Sequence[str], family: str) -> DefectScore:
-    """Of the findings that may count for it; a cause of no catalogue may as well be `left` unexplained at its place."""
-    unexplained = defect.physics == UNKNOWN and any(same_place(defect.port, w, family) is not None for w in left)
+    """Of the findings that may count for it, and what is `left` unexplained, where a cause may be without a name."""
+    unexplained = any(same_place(defect.port, w, family) is not None for w in left)
     there = [(f, why) for f in findings if (why := same_place(defect.port, f.where, family)) is not None]
     named = [(f, why) for f, why in there if f.physics == defect.physics or _as_good(f, defect, why)]
     rivals = [r for f in findings for r in f.rivals if _is(r, defect, family)]
@@ -277,7 +301,7 @@ def _said(finding: FindingRecord, truth: Truth, family: str) -> NamedCause:
         confidence=finding.confidence,
         says=finding.says,
         placed=bool(there),
-        right=any(d.physics == finding.physics or _as_good(finding, d, why) for d, why in there),
+        right=any(finding.physics in (d.physics, *d.also) or _as_good(finding, d, why) for d, why in there),
     )
 
 

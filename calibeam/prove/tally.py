@@ -11,6 +11,7 @@ from itertools import pairwise
 import numpy as np
 from scipy.stats import binomtest
 
+from calibeam.prove.raised import SURE, TROUBLES
 from calibeam.prove.record import DIAGNOSIS, PLAIN, UNKNOWN, CaseScore, DefectScore
 
 LEVEL = 0.95
@@ -175,6 +176,28 @@ def between_encoders(cases: Sequence[CaseScore]) -> list[TallyLine]:
     ones = [c for c in cases if c.kind == "encoders" and c.defects]
     words = sorted({c.defects[0].mechanism for c in ones})
     return [_line(word, [c for c in ones if c.defects[0].mechanism == word]) for word in words]
+
+
+OF_TROUBLES = ("cases", "located", "named", "asks for the column", "misnamed (>= 0.5)", "false alarms")
+
+
+def by_trouble(cases: Sequence[CaseScore]) -> list[tuple[str, tuple[Share, ...]]]:
+    """Of the kind `raised`, one line each: its name, and shares as in OF_TROUBLES; the first of all such cases."""
+    raised = [c for c in cases if c.trouble]
+    each = [(word, [c for c in raised if c.trouble == word]) for word in TROUBLES]
+    return [(word, _shares_of_trouble(mine, len(raised))) for word, mine in each if mine]
+
+
+def _shares_of_trouble(cases: Sequence[CaseScore], all_cases: int) -> tuple[Share, ...]:
+    hidden = [d for c in cases for d in c.defects]
+    return (
+        Share(len(cases), all_cases),
+        share(d.located for d in hidden),
+        share(d.named for d in hidden),
+        share(c.asks_for for c in cases if c.withheld),
+        share(any(s.misnamed_from(SURE) for s in c.said) for c in cases),
+        share(c.alarmed for c in cases if not c.defects),
+    )
 
 
 def by_fault(cases: Sequence[CaseScore]) -> list[TallyLine]:

@@ -28,6 +28,7 @@ class Load:
     down_flange: Floats  # (row, 3) direction of gravity in the flange frame
     frames: Frames  # where the arm stands
     gravity_m_s2: Floats  # (3,) in the base frame
+    arm: Arm | None = None  # what is weighed, for loads on the way between samples; None in the moving world
 
 
 def weigh(arm: Arm, frames: Frames, foot: Floats, payload_kg: Floats, payload_com_m: Floats) -> Load:
@@ -72,6 +73,7 @@ def weigh(arm: Arm, frames: Frames, foot: Floats, payload_kg: Floats, payload_co
         np.einsum("rji,j->ri", flange_turn, down),
         frames,
         arm.gravity_m_s2,
+        arm,
     )
 
 

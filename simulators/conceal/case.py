@@ -5,7 +5,7 @@ Mechanisms are chosen from what the session's rig has room for, and each is scal
 
 import zlib
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,7 +27,7 @@ from simulators.conceal.rig import ENCODER_RAD, Artefacts, DualPsd, TrueRig
 from simulators.conceal.rig_file import Belief, believe
 from simulators.conceal.rigs import DrawnRig, draw_rig
 from simulators.conceal.wanted import INSTRUMENT, ConcealError, Wanted, draw_noise
-from simulators.defects import MECHANISMS, Defect, Site, UnsuitedError
+from simulators.defects import MECHANISMS, RAISED, Defect, Scene, Site, UnsuitedError
 
 CARRIES = 0.02  # of the largest torque's spread: a joint below it feels no weight
 
@@ -38,7 +38,8 @@ def site_of(wanted: Wanted, drawn: DrawnRig, table: Timetable) -> Site:
     arm = true.arm
     frames = forward(arm, scene.goal_rad + arm.zero_rad)
     foot = np.broadcast_to(np.eye(4), (len(scene), 4, 4))
-    torque_nm = np.std(weigh(arm, frames, foot, scene.payload_kg, scene.payload_com_m).torque_nm, axis=0)
+    turning_nm = weigh(arm, frames, foot, scene.payload_kg, scene.payload_com_m).torque_nm
+    torque_nm = np.std(turning_nm, axis=0)
     places = (1,) if not isinstance(true.instrument, DualPsd) else tuple(range(1, len(true.instrument.places) + 1))
     seats = tuple(range(1, true.instrument.cones + 1)) if isinstance(true.instrument, Artefacts) else ()
     felt = np.flatnonzero(torque_nm > CARRIES * torque_nm.max()) if torque_nm.any() else []
@@ -57,6 +58,7 @@ def site_of(wanted: Wanted, drawn: DrawnRig, table: Timetable) -> Site:
         seats=seats,
         half_size_m=true.instrument.half_size_m if isinstance(true.instrument, DualPsd) else 0.0,
         duration_s=float(scene.t_s[-1]),
+        pushed=tuple(np.mean(turning_nm > 0.0, axis=0).tolist()),
     )
 
 
@@ -84,7 +86,7 @@ def choose(wanted: Wanted, rng: np.random.Generator) -> tuple[type[Defect], ...]
             fresh = [k for k in among if k not in chosen and _agree(k, chosen)] or among
             chosen.append(fresh[int(rng.integers(len(fresh)))])
         else:
-            chosen.append(_named(name, possible))
+            chosen.append(_named(name, possible, INSTRUMENT[wanted.family]))
     return tuple(chosen)
 
 
@@ -94,8 +96,8 @@ def _agree(kind: type[Defect], chosen: Sequence[type[Defect]]) -> bool:
     return len(habits) <= 1
 
 
-def _named(name: str, possible: Sequence[type[Defect]]) -> type[Defect]:
-    for kind in possible:
+def _named(name: str, possible: Sequence[type[Defect]], instrument: str) -> type[Defect]:
+    for kind in (*possible, *(kind for kind in RAISED if instrument in kind.INSTRUMENTS)):
         if name == kind.KIND:
             return kind
     names = ", ".join(kind.KIND for kind in possible)
@@ -220,6 +222,7 @@ def _usual(wanted: Wanted, table: Timetable, rng: np.random.Generator) -> set[st
     usual: set[str] = set()
     for chance, names in chances:
         usual |= names if rng.random() < chance else set()
+    usual |= {"temp_room_degC"} if wanted.thermometer_k else set()
     usual |= {"payload_kg"} if np.ptp(table.scene.payload_kg) > 0.0 else set()
     return usual | ({"qd"} if table.scene.qd_rad_s.any() else set())
 
@@ -247,6 +250,12 @@ class Case:
     rng: np.random.Generator  # for what is still to be drawn when the table is written
 
 
+def _with_drifting_thermometer(scene: Scene, drift_k: float) -> Scene:
+    """The thermometer of the room alone: joints and links are as warm as before."""
+    room = scene.temperature_degC["room"] + drift_k * scene.t_s / scene.t_s[-1]
+    return replace(scene, temperature_degC={**scene.temperature_degC, "room": room})
+
+
 def conceal(wanted: Wanted) -> Case:
     """Draws everything from the seed. ConcealError when the seed gives no session of the wanted kind."""
     rig_rng, plan_rng, noise_rng = (np.random.default_rng(s) for s in np.random.SeedSequence([wanted.seed, 1]).spawn(3))
@@ -255,6 +264,7 @@ def conceal(wanted: Wanted) -> Case:
     kinds = choose(wanted, hide_rng) if wanted.encoders is None else ()
     habits = draw_habits(wanted, kinds, plan_rng)
     table = draw_timetable(wanted, drawn.true, habits, plan_rng)
+    table = replace(table, scene=_with_drifting_thermometer(table.scene, wanted.thermometer_k))
     posture_rad = table.scene.goal_rad
     sigma_m = SIGMA[wanted.family] * float(plan_rng.uniform(0.7, 1.4))
     distances = measure_distances(drawn.true, plan_rng)

@@ -15,6 +15,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from simulators.arm.drawing import fixed_parts
+from simulators.arm.kinematics import forward
 from simulators.conceal.case import Case, HiddenMechanism
 from simulators.conceal.observe import at_the_flange
 from simulators.conceal.poses import free_poses
@@ -22,6 +24,7 @@ from simulators.conceal.readings import stand, tip_m
 from simulators.conceal.rig import ENCODER_RAD, Artefacts, Device, DualPsd, TrueRig
 from simulators.conceal.rig_file import pose_record, rig_document, toml_text
 from simulators.defects import Scene
+from simulators.defects.drive import WrongLoadCentre
 
 Floats = NDArray[np.float64]
 FREE_POSES = 200
@@ -33,7 +36,7 @@ def truth_document(case: Case) -> dict[str, Any]:
     return {
         "schema": 1,
         "wanted": asdict(case.wanted),
-        "defects": [_defect(one) for one in case.hidden],
+        "defects": [_defect(one) for one in case.hidden] + ([_convention(case)] if case.wanted.confused else []),
         "withheld": list(case.withheld),
         "noise": {
             "kind": case.wanted.noise,
@@ -60,9 +63,22 @@ def _defect(one: HiddenMechanism) -> dict[str, Any]:
         "size_field": defect.SIZE,
         "fields": dict(vars(defect)),
         "figures": dict(defect.figures),
+        "also": list(defect.ALSO),
         "enr": one.enr,
         "enr_before_geometry": one.raw,
     }
+
+
+def _convention(case: Case) -> dict[str, Any]:
+    """A table under the name of the wrong convention, as a cause: its size is how far it puts the flange off."""
+    arm = case.drawn.true.arm
+    stated, true = (
+        forward(replace(arm, fixed=fixed), case.table.scene.goal_rad + arm.zero_rad).flange[:, :3, 3]
+        for fixed in (fixed_parts(case.drawn.drawing), arm.fixed)
+    )
+    off_m = float(np.sqrt(np.mean((stated - true) ** 2)))
+    named = {"mechanism": "confused-convention", "physics": "rig-convention", "port": "arm.model"}
+    return named | {"drivers": [], "figures": {}, "enr": off_m / case.sigma_m}
 
 
 def _rig(rig: TrueRig) -> dict[str, Any]:
@@ -229,6 +245,9 @@ def columns(case: Case) -> dict[str, Column]:
     instrument = case.drawn.true.instrument
     artefacts = instrument if isinstance(instrument, Artefacts) else None
     written = session_columns(case.table.scene, case.reading_rad, case.table.repeat, case.recorded, case.rng, artefacts)
+    for one in case.hidden:
+        if isinstance(one.defect, WrongLoadCentre):
+            written |= one.defect.stated_columns(case.table.scene)
     for channel, name in enumerate(VALUES[case.wanted.family]):
         written[name] = case.values_m[:, channel].tolist()
     if case.second_rad is not None:

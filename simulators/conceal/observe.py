@@ -30,7 +30,7 @@ from simulators.conceal.readings import (
 from simulators.conceal.rig import Artefacts, Device, DualPsd, TrueRig
 from simulators.conceal.wanted import ConcealError, Side
 from simulators.defects import Defect, Scene, Site, UnsuitedError
-from simulators.defects.defect import MovesSeat, TurnsJoint, with_size
+from simulators.defects.defect import MovesSeat, MovesStations, TurnsJoint, with_size
 from simulators.defects.drive import SlackDrive, SoftJoint
 from simulators.defects.encoder import RADIUS_M, EccentricDisc, SecondDisc, SecondSlip
 
@@ -44,7 +44,13 @@ def seated_readings(
     rig: TrueRig, artefacts: Artefacts, scene: Scene, defects: Sequence[Defect], posture_rad: Floats
 ) -> Floats:
     """Encoder readings (row, n) with the probe truly in its cone, in the posture nearest to `posture_rad` (row, n)."""
-    return readings_at(rig, artefacts.seat_m[scene.seat - 1], scene, defects, posture_rad)
+    seat_m, cone = artefacts.seat_m[scene.seat - 1], (scene.seat <= artefacts.cones)[:, np.newaxis]
+    for defect in defects:
+        if isinstance(defect, MovesStations):
+            motion = defect.stations_motion(scene)
+            moved_m = np.einsum("rij,rj->ri", motion[:, :3, :3], seat_m) + motion[:, :3, 3]
+            seat_m = np.where(cone, moved_m, seat_m)  # bars are held by hand
+    return readings_at(rig, seat_m, scene, defects, posture_rad)
 
 
 def readings_at(rig: TrueRig, wanted_m: Floats, scene: Scene, defects: Sequence[Defect], posture_rad: Floats) -> Floats:
@@ -173,13 +179,21 @@ def machine_like(wanted_kinds: Sequence[str], site: Site, rng: np.random.Generat
             )
         kind = kinds[int(rng.integers(len(kinds)))]
         try:
-            drawn = kind.draw(rng, site)
+            drawn = _elsewhere(kind, {one.port for one in out}, site, rng)
         except UnsuitedError as reason:
             raise ConcealError(f"{kind.KIND}: {reason}; take another arm, family or seed") from reason
         low, high = SIZES[kind]
         size = float(np.exp(rng.uniform(np.log(low), np.log(high))))
         out.append(with_size(drawn, size * (float(np.sign(drawn.slip_rad)) if isinstance(drawn, SecondSlip) else 1.0)))
     return out
+
+
+def _elsewhere(kind: type[Any], taken: set[str], site: Site, rng: np.random.Generator) -> Any:
+    """One whose place is not taken. UnsuitedError where there is none."""
+    for _ in range(DRAW_ROUNDS):
+        if (drawn := kind.draw(rng, site)).port not in taken:
+            return drawn
+    raise UnsuitedError("every joint has one already")
 
 
 def at_the_flange(defects: Sequence[Defect], side: Side) -> list[Defect]:

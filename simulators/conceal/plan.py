@@ -75,6 +75,7 @@ class Habits:
     payload_kg: tuple[float, ...] = (0.0,)  # carried in turns
     pause_s: float = 0.0  # one long break, in which the arm cools
     change_s: float = 400.0  # to carry the fixture to another place
+    in_turns: bool = False  # every station stands there all the time, and they are measured in turns
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,7 +107,7 @@ def timetable(
     chosen = rng.choice(loose, size=min(REPEATED, loose.size), replace=False)
     group[chosen] = np.arange(1, chosen.size + 1)
     taken = np.concatenate((np.arange(len(pose_rad)), np.repeat(chosen, COPIES)))
-    stay = _stays(place[taken], rng)
+    stay = np.zeros(taken.size, dtype=np.int64) if habits.in_turns else _stays(place[taken], rng)
     lot = rng.random(taken.size)
     lot = np.where(links[taken] > 0, rng.random(links.max() + 1)[links[taken]], lot)
     order = np.lexsort((lot, stay))
@@ -199,6 +200,7 @@ def draw_habits(wanted: Wanted, kinds: Sequence[type[Defect]], rng: np.random.Ge
         moving="moving" in asked or (driven and not asked and rng.random() < 0.1),
         payload_kg=(loads if carries else always) if driven else (0.0,),
         pause_s=float(rng.choice([0.0, 2400.0])),
+        in_turns="in turns" in asked,
     )
 
 

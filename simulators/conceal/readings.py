@@ -32,6 +32,7 @@ from simulators.defects.defect import (
     MovesDevice,
     MovesFixture,
     MovesLink,
+    MovesStations,
     MovesTool,
     ReadsAngle,
     TurnsJoint,
@@ -180,6 +181,8 @@ def spots(rig: TrueRig, fixture: DualPsd, scene: Scene, defects: Sequence[Defect
     for defect in defects:
         if isinstance(defect, MovesFixture):
             psd1 = psd1 @ defect.fixture_motion(scene)
+        if isinstance(defect, MovesStations):
+            psd1 = defect.stations_motion(scene) @ psd1
     light = shine(laser, fixture.laser_direction, psd1, fixture.psd2_in_psd1, scene.first_psd, scene.laser_power)
     if scene.laser_sum_v is not None:
         light = replace(light, sum_v=scene.laser_sum_v)

@@ -177,7 +177,7 @@ class DrawnRig:
 def draw_rig(wanted: Wanted, rng: np.random.Generator) -> DrawnRig:
     """The rig of a session. ConcealError for an arm of unknown name or places that cannot be reached."""
     full = _choose_arm(wanted, rng)
-    shown = as_local_poe(full) if full.gear_ratio and rng.random() < 0.25 else full
+    shown = as_local_poe(full) if full.gear_ratio and rng.random() < 0.25 and not wanted.confused else full
     if rng.random() < 0.15:
         shown = replace(shown, mass_kg=(), com_m=())
     spread = _spread(full, rng)
@@ -188,7 +188,14 @@ def draw_rig(wanted: Wanted, rng: np.random.Generator) -> DrawnRig:
         point_m = np.array([0.0, 0.0, 0.05]) + rng.uniform(-0.06, 0.06, 3) if full.gear_ratio else np.zeros(3)
         believed = TrueRig(arm, point_m, _others(wanted, full, rng))
         true = perturbed(believed, spread, rng)
-    return DrawnRig(shown, believed, true, spread)
+    return DrawnRig(_confused(shown) if wanted.confused else shown, believed, true, spread)
+
+
+def _confused(drawing: Drawing) -> Drawing:
+    """The same numbers under the name of the other convention."""
+    if drawing.model == "local-poe":
+        raise ConcealError(f"{drawing.name} has no table of Denavit and Hartenberg; take another family or seed")
+    return replace(drawing, model="mdh" if drawing.model == "dh" else "dh")
 
 
 def _choose_arm(wanted: Wanted, rng: np.random.Generator) -> Drawing:

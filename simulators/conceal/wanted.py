@@ -68,3 +68,5 @@ class Wanted:
     withhold: bool = False  # the column that would name the defect is not recorded
     encoders: Side | None = None  # second encoders are recorded, and defects are of machine-like size, whatever `enr`
     side_stated: bool = False  # the rig file states on which side of the gear they sit
+    confused: bool = False  # the rig file states the other of the two conventions of Denavit and Hartenberg
+    thermometer_k: float = 0.0  # by which a room thermometer drifts; nothing depends on it. Not 0: it is recorded

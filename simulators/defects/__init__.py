@@ -8,12 +8,13 @@ lists the places), and one line in `mechanisms.MECHANISMS`, or in
 
 from simulators.arm.statics import Load
 from simulators.defects.defect import Defect, size_of, with_size
-from simulators.defects.mechanisms import GIVEN, MECHANISMS, WrittenError, defects_of, written
+from simulators.defects.mechanisms import GIVEN, MECHANISMS, RAISED, WrittenError, defects_of, written
 from simulators.defects.scene import Light, Scene, Site, UnsuitedError
 
 __all__ = [
     "GIVEN",
     "MECHANISMS",
+    "RAISED",
     "Defect",
     "Light",
     "Load",

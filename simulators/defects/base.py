@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from simulators.arm.rigid import turned
 from simulators.arm.statics import Load, Weight, carried_by, loaded_by
 from simulators.defects.defect import ANY_INSTRUMENT, ROBOT, Defect
-from simulators.defects.displacement import Bump, CarriedPart, Displacement, Settling
+from simulators.defects.displacement import BriefShift, Bump, CarriedPart, Displacement, Settling
 from simulators.defects.scene import Scene, Site
 
 Floats = NDArray[np.float64]
@@ -31,6 +31,14 @@ class BumpedBase(_MovedBase, Bump):
 
     KIND = "bumped-base"
     TYPICAL = 4e-5
+
+
+@dataclass(frozen=True)
+class BrieflyShiftedBase(_MovedBase, BriefShift):
+    """A foot on which somebody leaned for a while."""
+
+    KIND = "briefly-shifted-base"
+    TYPICAL = 5e-5
 
 
 @dataclass(frozen=True)

@@ -32,6 +32,7 @@ class Mechanism:
     PORT: ClassVar[str]  # where it sits: "joint{joint}.angle", as in the interchange format
     DRIVERS: ClassVar[tuple[str, ...]]  # what it depends on: "q{joint}", as in the interchange format
     FIGURES: ClassVar[tuple[str, ...]] = ()  # fields that a diagnosis states under the same names
+    ALSO: ClassVar[tuple[str, ...]] = ()  # physics that is truly at this port, too, as a part of the mechanism
 
     @property
     def port(self) -> str:
@@ -54,7 +55,9 @@ class Defect(Mechanism):
     SIZE: ClassVar[str] = "share"  # the field that scales it: of what a model has found, all of it
     TYPICAL: ClassVar[float] = 1.0  # a plausible value of that field, in its unit
     INSTRUMENTS: ClassVar[tuple[str, ...]]  # where it can occur
-    HABIT: ClassVar[str] = ""  # how a session must be run to show it: "moving", "direct", "payload" or "" for any
+    HABIT: ClassVar[str] = (
+        ""  # how a session must be run to show it: "moving", "direct", "payload", "in turns", "" for any
+    )
     NEEDS: ClassVar[tuple[str, ...]] = ()  # see `needs`
     ASKED: ClassVar[bool] = False  # drawn only where its name is asked for: seeds of published proofs keep their cases
 
@@ -177,6 +180,15 @@ class MovesFixture(Protocol):
 
     def fixture_motion(self, scene: Scene) -> Floats:
         """Motion (row, 4, 4) of the fixture in its own frame."""
+        ...
+
+
+@runtime_checkable
+class MovesStations(Protocol):
+    """Under all stations of the fixture, or all cones, at once."""
+
+    def stations_motion(self, scene: Scene) -> Floats:
+        """Motion (row, 4, 4) in the base frame."""
         ...
 
 

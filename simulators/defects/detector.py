@@ -218,6 +218,37 @@ class CoverGlass(PsdDefect):
 
 
 @dataclass(frozen=True)
+class SpottedFace(PsdDefect):
+    """A burn or a grain of dust on a face: around `centre_m` readings are off by up to `height_m` along a line.
+
+    The light that the spot swallows moves the centre of what is left; a round bell of width `width_m` (one sigma) in
+    the place on the face.
+    """
+
+    height_m: float
+    centre_m: tuple[float, float]
+    width_m: float
+    towards_rad: float
+
+    KIND = "psd-spot"
+    PHYSICS = "psd-local-defect"
+    SIZE = "height_m"
+    TYPICAL = 2e-5
+    FIGURES = ("height_m", "width_m")
+
+    @classmethod
+    def draw(cls, rng: np.random.Generator, site: Site) -> Self:
+        x_m, y_m = (float(value) for value in 0.5 * site.half_size_m * rng.uniform(-1.0, 1.0, 2))
+        width_m = float(rng.uniform(0.15, 0.35) * site.half_size_m)
+        return cls(either_psd(rng), cls.draw_size(rng), (x_m, y_m), width_m, phase(rng))
+
+    def seen_m(self, own_m: Floats, light: Light, scene: Scene) -> Floats:
+        far = np.sum((own_m - np.asarray(self.centre_m)) ** 2, axis=1, keepdims=True) / self.width_m**2
+        along = np.array([np.cos(self.towards_rad), np.sin(self.towards_rad)])
+        return own_m + self.height_m * np.exp(-0.5 * far) * along
+
+
+@dataclass(frozen=True)
 class StrainedFace(PsdDefect):
     """A face whose picture is strained like a sheet of rubber: `x` and `y` too long, and sheared by `shear` (no unit).
 

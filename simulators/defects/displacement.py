@@ -58,6 +58,24 @@ class Bump(Displacement):
 
 
 @dataclass(frozen=True)
+class BriefShift(Bump):
+    """Knocked, and pushed back: from `until_s` on it stands where it stood before `at_s`."""
+
+    until_s: float
+
+    FIGURES = ("at_s", "shift_m", "until_s")
+
+    @classmethod
+    def draw(cls, rng: np.random.Generator, site: Site) -> Self:
+        at_s = float(rng.uniform(0.15, 0.45) * site.duration_s)
+        until_s = at_s + float(rng.uniform(0.2, 0.4) * site.duration_s)
+        return cls(*cls._draw_way(rng), at_s, until_s)
+
+    def gone_m(self, scene: Scene) -> Floats:
+        return np.where((scene.t_s >= self.at_s) & (scene.t_s < self.until_s), self.shift_m, 0.0)
+
+
+@dataclass(frozen=True)
 class Settling(Displacement):
     """Slowly moves and turns, more slowly as time goes on: by `shift_m` in the end, with one time constant."""
 

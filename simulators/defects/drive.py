@@ -6,9 +6,10 @@ from typing import ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from simulators.arm.kinematics import forward
 from simulators.arm.rigid import Vector
-from simulators.arm.statics import Load, Weight, carried_by, loaded_by
-from simulators.defects.defect import ROBOT, Defect, phase
+from simulators.arm.statics import Load, Weight, carried_by, loaded_by, weigh
+from simulators.defects.defect import ROBOT, Defect, as_vector, direction, phase
 from simulators.defects.scene import Scene, Site, UnsuitedError
 
 Floats = NDArray[np.float64]
@@ -159,7 +160,7 @@ class SlackDrive(DriveDefect):
 
     def turn_rad(self, shaft_rad: Floats, scene: Scene, load: Load) -> Floats:
         column = self.joint - 1
-        return played(scene.via_rad[:, column], scene.goal_rad[:, column], self.play_rad)
+        return played(np.stack((scene.via_rad[:, column], scene.goal_rad[:, column]), axis=1), self.play_rad)
 
 
 @dataclass(frozen=True)
@@ -191,22 +192,20 @@ class SlackUnderWeight(DriveDefect):
         return 0.5 * self.play_rad * lean
 
 
-def played(via_rad: Floats, goal_rad: Floats, play_rad: float) -> Floats:
-    """Driven less driving side at the goal of each row, (row,), for one joint, with the history of the motion.
+def played(way: Floats, play: float) -> Floats:
+    """Driven less driving side at the end of each row, (row,), with the history of the motion, in the unit of `way`.
 
     The play operator (Visintin, "Differential Models of Hysteresis", 1994, section III.2): the driven side stays where
-    it is until one flank of the driving side meets it, w <- min(max(w, u - b/2), u + b/2). The driving side goes from
-    goal to `via_rad` and on to the next `goal_rad`, both (row,), row by row; the driven side first stands in the
-    middle.
+    it is until one flank of the driving side meets it, w <- min(max(w, u - b/2), u + b/2). The driving side goes along
+    `way` (row, step), row by row; the driven side first stands in the middle.
     """
-    half_rad = 0.5 * play_rad
-    driven_rad = via_rad[0]
-    behind_rad = np.empty_like(goal_rad)
-    for row, (via, goal) in enumerate(zip(via_rad.tolist(), goal_rad.tolist(), strict=True)):
-        for driving in (via, goal):
-            driven_rad = min(max(driven_rad, driving - half_rad), driving + half_rad)
-        behind_rad[row] = driven_rad - goal
-    return behind_rad
+    half, driven = 0.5 * play, float(way[0, 0])
+    behind = np.empty(len(way))
+    for row, steps in enumerate(way.tolist()):
+        for driving in steps:
+            driven = min(max(driven, driving - half), driving + half)
+        behind[row] = driven - steps[-1]
+    return behind
 
 
 # --- compliance
@@ -261,6 +260,100 @@ class TwoSlopeFlexspline(SoftJoint):
         torque_nm = load.torque_nm[:, self.joint - 1]
         soft_nm = np.clip(torque_nm, -self.knee_nm, self.knee_nm)
         return self.compliance_rad_nm * (soft_nm + self.hardening * (torque_nm - soft_nm))
+
+
+@dataclass(frozen=True)
+class OneSidedSpring(SoftJoint):
+    """A drive that is stiffer in one sense: for negative torques it yields `share_back` (no unit) of its compliance.
+
+    One flank of each tooth is worn, or a pair of pinions is preloaded: turn = compliance x torque for positive torques,
+    and that share of it for negative ones.
+    """
+
+    share_back: float
+
+    KIND = "one-sided-spring"
+    TYPICAL = 6e-6
+
+    @classmethod
+    def draw(cls, rng: np.random.Generator, site: Site) -> Self:
+        both = [joint for joint in site.loaded if 0.2 < site.pushed[joint - 1] < 0.8]
+        if not both:
+            raise UnsuitedError("gravity turns no joint of this session in both senses")
+        return cls(int(rng.choice(both)), cls.draw_size(rng), float(rng.uniform(0.0, 0.4)))
+
+    def turn_rad(self, shaft_rad: Floats, scene: Scene, load: Load) -> Floats:
+        torque_nm = load.torque_nm[:, self.joint - 1]
+        return self.compliance_rad_nm * np.where(torque_nm > 0.0, torque_nm, self.share_back * torque_nm)
+
+
+@dataclass(frozen=True)
+class WrongLoadCentre(SoftJoint):
+    """A soft joint and a payload whose centre of mass is stated `off_m` (flange frame) from where it is."""
+
+    off_m: Vector
+
+    KIND = "wrong-load-centre"
+    PHYSICS = "load-centre"
+    HABIT = "payload"
+    NEEDS = ("payload_kg", "payload_com")
+    ALSO = ("joint-compliance",)
+
+    @classmethod
+    def draw(cls, rng: np.random.Generator, site: Site) -> Self:
+        off_m = as_vector(rng.uniform(0.08, 0.2) * np.asarray(direction(rng)))
+        return cls(site.loaded_joint(rng), cls.draw_size(rng), off_m)
+
+    def stated_columns(self, scene: Scene) -> dict[str, list[float]]:
+        """The payload's centre as the recording has it, m."""
+        centre_m = np.broadcast_to(scene.payload_com_m + np.asarray(self.off_m), (len(scene), 3))
+        return {f"payload_com_{axis}_m": centre_m[:, k].tolist() for k, axis in enumerate("xyz")}
+
+
+ON_THE_WAY = 8  # loads of each straight move: torque is a smooth function of the angles
+
+
+@dataclass(frozen=True)
+class HystereticSpring(SoftJoint):
+    """A drive whose deflection trails its load: strain-wave gears and cycloids under changing torque.
+
+    Prandtl and Ishlinskii's model: turn = compliance x the mean of play operators in the torque, with thresholds of
+    `thresholds_nm` (Visintin, "Differential Models of Hysteresis", 1994, section III.2). Each starts in the middle and
+    keeps its state through all moves between the samples, from goal to `via_rad` and on to the next goal.
+    """
+
+    thresholds_nm: tuple[float, ...]
+
+    KIND = "hysteretic-spring"
+    PHYSICS = "load-hysteresis"
+    HABIT = "direct"
+    ALSO = ("joint-compliance",)
+
+    @classmethod
+    def draw(cls, rng: np.random.Generator, site: Site) -> Self:
+        joint = site.loaded_joint(rng)
+        thresholds_nm = np.sort(rng.uniform(0.1, 1.2, 3)) * site.torque_nm[joint - 1]
+        return cls(joint, cls.draw_size(rng), tuple(float(value) for value in thresholds_nm))
+
+    def turn_rad(self, shaft_rad: Floats, scene: Scene, load: Load) -> Floats:
+        way_nm = self._on_the_way_nm(scene, load)
+        behind_nm = np.mean([played(way_nm, 2.0 * half_nm) for half_nm in self.thresholds_nm], axis=0)
+        return self.compliance_rad_nm * (way_nm[:, -1] + behind_nm)
+
+    def _on_the_way_nm(self, scene: Scene, load: Load) -> Floats:
+        """(row, step) torque of gravity on the way to each sample; deflections of 1e-4 rad change none of it."""
+        if load.arm is None:
+            raise UnsuitedError("the loads between samples are not known in a moving world")
+        before_rad = np.concatenate((scene.via_rad[:1], scene.goal_rad[:-1]))
+        gone = np.arange(1, ON_THE_WAY + 1)[:, np.newaxis] / ON_THE_WAY
+        legs = ((before_rad, scene.via_rad), (scene.via_rad, scene.goal_rad))
+        way_rad = np.concatenate([(a + gone[:, np.newaxis] * (b - a)).swapaxes(0, 1) for a, b in legs], axis=1)
+        rows, steps, n = way_rad.shape
+        frames = forward(load.arm, way_rad.reshape(-1, n) + load.arm.zero_rad)
+        ground = np.broadcast_to(np.eye(4), (rows * steps, 4, 4))
+        centre_m = np.repeat(np.broadcast_to(scene.payload_com_m, (rows, 3)), steps, axis=0)
+        found = weigh(load.arm, frames, ground, np.repeat(scene.payload_kg, steps), centre_m)
+        return found.torque_nm[:, self.joint - 1].reshape(rows, steps)
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from simulators.arm.rigid import Vector, moved
 from simulators.defects.defect import SPOTS, Defect, direction
-from simulators.defects.displacement import CarriedPart
+from simulators.defects.displacement import Bump, CarriedPart
 from simulators.defects.scene import Scene, Site
 
 Floats = NDArray[np.float64]
@@ -100,3 +100,33 @@ class CarriedFixture(CarriedPart):
     def fixture_motion(self, scene: Scene) -> Floats:
         here = (scene.placement == self.place) & (scene.t_s < self.until_s)
         return np.where(here[:, np.newaxis, np.newaxis], self.carried(scene), np.eye(4))
+
+
+class _AllStations(Bump):
+    TYPICAL = 4e-5
+    TURNS_RAD_M = (0.3, 1.5)
+
+    def stations_motion(self, scene: Scene) -> Floats:
+        """Motion (row, 4, 4) in the base frame of all that the arm is measured against."""
+        return self.motion(scene)
+
+
+@dataclass(frozen=True)
+class KnockedTable(_AllStations):
+    """The table with all stations of the fixture was knocked: from `at_s` on they stand elsewhere, as one body."""
+
+    KIND = "knocked-table"
+    PHYSICS = "fixture-moved"
+    PORT = "fixture*.pose"
+    INSTRUMENTS = SPOTS
+    HABIT = "in turns"
+
+
+@dataclass(frozen=True)
+class KnockedPlate(_AllStations):
+    """The plate with all cones was knocked: from `at_s` on they stand elsewhere, as one body."""
+
+    KIND = "knocked-plate"
+    PHYSICS = "seat-moved"
+    PORT = "seat*.position"
+    INSTRUMENTS = ("seat",)

@@ -204,6 +204,34 @@ class HeatedLink(_OneLink, Growth):
 
 
 @dataclass(frozen=True)
+class LaggingLink(HeatedLink):
+    """Link whose casting follows the thermometer on its skin with one time constant, and grows by `expansion_per_k`.
+
+    A body of one thermal mass behind its skin (Newton's law of cooling): dT / dt = (skin - T) / time constant, exact
+    for a skin whose temperature goes straight from sample to sample; at the first sample both are alike.
+    """
+
+    time_constant_s: float = 1800.0
+
+    KIND = "lagging-link"
+    FIGURES = ("expansion_per_k", "time_constant_s")
+
+    @classmethod
+    def draw(cls, rng: np.random.Generator, site: Site) -> Self:
+        return cls(site.long_link(rng), cls.draw_size(rng), "", float(rng.uniform(900.0, 2700.0)))
+
+    def link_motion(self, link: int, end_m: Floats, angle_rad: Floats, scene: Scene, load: Load) -> Floats:
+        t_s, skin_k = scene.t_s, scene.warmed_k(self.where or f"link{link}")
+        inside_k = skin_k.copy()
+        for row in range(1, t_s.size):
+            step_s = max(t_s[row] - t_s[row - 1], 1e-9)
+            keep = np.exp(-step_s / self.time_constant_s)
+            behind_k = (skin_k[row] - skin_k[row - 1]) * self.time_constant_s / step_s
+            inside_k[row] = skin_k[row] - behind_k + (inside_k[row - 1] - skin_k[row - 1] + behind_k) * keep
+        return shifted(self.expansion_per_k * inside_k[:, np.newaxis] * end_m)
+
+
+@dataclass(frozen=True)
 class WarmArm(Growth):
     """Arm that grows with the room by `expansion_per_k`, every link alike."""
 

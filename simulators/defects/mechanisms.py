@@ -1,7 +1,8 @@
 """Every mechanism, and mechanisms as plain values. A new one is a class and a line here.
 
-`MECHANISMS` are what a concealed session draws from; `GIVEN` are those that have their numbers from a model or from a
-person, and that no session draws.
+`MECHANISMS` are what a concealed session draws from. `RAISED` were met on real robots, are drawn only where they are
+asked for by name, and have no part in the moving world of the emulators. `GIVEN` are those that have their numbers from
+a model or from a person, and that no session draws.
 
 As plain values: [{"mechanism": "soft-joint", "fields": {...}}, ...], as a revealed truth lists them.
 """
@@ -65,6 +66,17 @@ MECHANISMS: tuple[type[Defect], ...] = (
     outside.Fringes,
     outside.BentRay,
     outside.DragChain,
+)
+RAISED: tuple[type[Defect], ...] = (
+    detector.SpottedFace,
+    fixture.KnockedTable,
+    fixture.KnockedPlate,
+    drive.HystereticSpring,
+    drive.OneSidedSpring,
+    drive.WrongLoadCentre,
+    link.LaggingLink,
+    base.BrieflyShiftedBase,
+    tool.BrieflyShiftedLaser,
 )
 GIVEN: tuple[type[Defect], ...] = (
     encoder.StaleReading,

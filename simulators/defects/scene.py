@@ -79,6 +79,7 @@ class Site:
     seats: tuple[int, ...]
     half_size_m: float
     duration_s: float
+    pushed: tuple[float, ...] = ()  # (n,) share of the samples in which gravity turns the joint forwards
 
     def stay_s(self, place: int, rng: np.random.Generator) -> tuple[float, float]:
         """A moment well within a stay of the fixture at a place, and the end of that stay (s)."""

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from simulators.arm.rigid import Vector, shifted, turned_about
 from simulators.arm.statics import Load
 from simulators.defects.defect import ROBOT, SPOTS, Defect, as_vector, direction
-from simulators.defects.displacement import Bump, CarriedPart
+from simulators.defects.displacement import BriefShift, Bump, CarriedPart
 from simulators.defects.scene import Scene, Site
 
 Floats = NDArray[np.float64]
@@ -201,3 +201,10 @@ class ReseatedLaser(Bump):
 
     def tool_motion(self, scene: Scene, load: Load) -> Floats:
         return self.motion(scene)
+
+
+@dataclass(frozen=True)
+class BrieflyShiftedLaser(BriefShift, ReseatedLaser):
+    """A laser that a cable pulled aside for a while."""
+
+    KIND = "briefly-shifted-laser"

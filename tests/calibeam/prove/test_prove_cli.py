@@ -118,3 +118,8 @@ def test_a_folder_with_something_in_it_is_refused(tmp_path: Path, capsys: pytest
 def test_physics_that_no_catalogue_has_cannot_be_taken_out(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.run(["prove", "--out", str(tmp_path / "p"), "--without", "magic"]) == 1
     assert "no physics of the catalogue" in " ".join(capsys.readouterr().err.split())
+
+
+def test_a_trouble_that_is_not_known_is_refused_by_name(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.run(["prove", "--out", str(tmp_path / "p"), "--kind", "raised", "--mechanism", "soft-joint"]) == 1
+    assert "detector-local-defect" in capsys.readouterr().err

@@ -14,6 +14,7 @@ from calibeam.prove.scoring import score
 from calibeam.prove.seal import Layout
 from calibrate.diagnose.file import write_diagnosis
 from calibrate.diagnose.schema import (
+    BlunderRecord,
     DiagnosisFile,
     FindingRecord,
     NotRecorded,
@@ -55,7 +56,12 @@ def scored(tmp_path: Path) -> Scored:
     """Of defects, findings and what else a file says."""
 
     def run(
-        defects: tuple[TrueDefect, ...], *findings: FindingRecord, withheld: tuple[str, ...] = (), **more: object
+        defects: tuple[TrueDefect, ...],
+        *findings: FindingRecord,
+        withheld: tuple[str, ...] = (),
+        confused: bool = False,
+        trouble: str = "",
+        **more: object,
     ) -> CaseScore:
         layout = Layout(tmp_path)
         exact = _write_recording(layout.recording(NAME))
@@ -72,7 +78,8 @@ def scored(tmp_path: Path) -> Scored:
         write_diagnosis(layout.answer(NAME) / "diagnosis.json", file)
         truth = Truth({}, defects, withheld, TrueNoise("white", NOISE_M, NOISE_M), Exact(exact), FreeSpace())
         kind = "withheld" if withheld else "one"
-        concealed = Concealed(Scenario(NAME, kind, Wanted("tracker", seed=5000)), "", b"", 0)
+        scenario = Scenario(NAME, kind, Wanted("tracker", seed=5000, confused=confused), trouble=trouble)
+        concealed = Concealed(scenario, "", b"", 0)
         return score(layout, concealed, Answered(NAME, 1.0, ""), truth)
 
     return run
@@ -83,7 +90,7 @@ def _write_recording(folder: Path) -> list[list[float]]:
     exact = rng.uniform(-0.5, 0.5, (400, 3))
     seen = exact + NOISE_M * rng.standard_normal(exact.shape)
     seen[7] += 0.01  # wild: of nobody's making
-    folder.mkdir(parents=True)
+    folder.mkdir(parents=True, exist_ok=True)
     (folder / "rig.toml").write_text(RIG, encoding="utf-8")
     rows = [f"{i},{0.1},{0.2},{','.join(map(repr, row.tolist()))}" for i, row in enumerate(seen)]
     (folder / "samples.csv").write_text("\n".join(["t_s,q1_rad,q2_rad,x_m,y_m,z_m", *rows]) + "\n", encoding="utf-8")
@@ -188,3 +195,41 @@ def test_a_missing_column_is_not_asked_for_by_calling_all_consistent(scored: Sco
 def test_the_floor_is_the_noise_that_was_added(scored: Scored, defect: MakeDefect) -> None:
     case = scored((defect(),))
     assert case.floor_m == pytest.approx(NOISE_M, rel=0.05)
+
+
+def test_all_stations_moved_is_a_base_moved_the_other_way_if_the_answer_states_both(
+    scored: Scored, defect: MakeDefect
+) -> None:
+    table = defect("fixture-moved", "fixture*.pose", drivers=("t",), figures={})
+    tied = RivalRecord("fixture.pose", "t", "step", None, "fixture-moved", confidence=0.5, margin=0.0)
+    [alone] = scored((table,), _finding("base.pose", "base-moved", "t")).defects
+    assert (alone.located, alone.named) == (True, False)
+    both = scored((table,), _finding("base.pose", "base-moved", "t", rivals=(tied,)))
+    assert both.defects[0].named
+    assert not both.misnamed
+    assert scored((table,), _finding("fixture.pose", "fixture-moved", "t")).defects[0].named
+
+
+def test_a_part_of_the_cause_is_neither_its_name_nor_a_wrong_one(scored: Scored, defect: MakeDefect) -> None:
+    hysteresis = defect("load-hysteresis", also=("joint-compliance",))
+    case = scored((hysteresis,), _finding("joint2.angle", "joint-compliance"))
+    assert (case.defects[0].located, case.defects[0].named) == (True, False)
+    assert not case.misnamed
+
+
+def test_a_confused_convention_is_named_by_a_fault_of_the_file_that_says_so(scored: Scored, defect: MakeDefect) -> None:
+    confused = defect("rig-convention", "arm.model", drivers=(), figures={})
+    fault = BlunderRecord("table", (), "", "the table seems to be in the other form of Denavit and Hartenberg")
+    [named] = scored((confused,), confused=True, blunders=(fault,)).defects
+    assert (named.located, named.named) == (True, True)
+    [other] = scored((confused,), confused=True, blunders=(BlunderRecord("degrees", (), "", "degrees"),)).defects
+    assert not other.located
+
+
+def test_of_a_raised_trouble_structure_without_a_name_at_its_place_is_located(
+    scored: Scored, defect: MakeDefect
+) -> None:
+    left = UnexplainedRecord("psd1.reading", "spot1", 1e-5, 0.5, 1e-4, "")
+    spot = defect("psd-local-defect", "psd1.reading", drivers=("spot1",), figures={})
+    assert scored((spot,), trouble="detector-local-defect", unexplained=left).defects[0].located
+    assert not scored((spot,), unexplained=left).defects[0].located

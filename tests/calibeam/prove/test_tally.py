@@ -7,7 +7,7 @@ import pytest
 from calibeam.prove.misses import faults
 from calibeam.prove.page import ELSEWHERE, confusion
 from calibeam.prove.record import CaseScore, DefectScore, NamedCause, SizeScore
-from calibeam.prove.tally import Share, by_effect, by_enr, figures, plain, share
+from calibeam.prove.tally import Share, by_effect, by_enr, by_trouble, figures, plain, share
 
 Case = Callable[..., CaseScore]
 Found = Callable[..., DefectScore]
@@ -102,3 +102,17 @@ def test_the_confusion_matrix_has_right_answers_on_its_diagonal(case: Case, foun
     assert counts[0, said.index("reading-lag")] == 1
     assert counts[1, said.index("nothing")] == 1
     assert counts.sum() == len(cases)
+
+
+def test_troubles_count_causes_alarms_and_wrong_names_of_half_confidence(case: Case, found: Found) -> None:
+    spot = "detector-local-defect"
+    cases = [
+        case((found(named=False),), trouble=spot),
+        case((found(located=False, named=False),), (_said(confidence=0.6),), trouble=spot),
+        case((), (_said(confidence=0.3),), trouble="room-temperature"),
+        case((found(),), (_said(),)),
+    ]
+    [(label, first), (other, null)] = by_trouble(cases)
+    assert (label, other) == (spot, "room-temperature")
+    assert [share.k for share in first] == [2, 1, 0, 0, 1, 0]
+    assert [(share.k, share.n) for share in null] == [(1, 3), (0, 0), (0, 0), (0, 0), (0, 1), (1, 1)]

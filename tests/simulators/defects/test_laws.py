@@ -9,13 +9,14 @@ from simulators.conceal.case import Case, conceal
 from simulators.conceal.observe import observe
 from simulators.conceal.wanted import INSTRUMENT, Wanted
 from simulators.defects.defect import Defect, size_of, with_size
-from simulators.defects.mechanisms import MECHANISMS
+from simulators.defects.mechanisms import MECHANISMS, RAISED
 
 PORTS = {
     *(f"joint{i}.angle" for i in range(1, 7)),
     *(f"link{i}.{what}" for i in ("*", *range(1, 7)) for what in ("length", "tilt")),
     *("base.pose", "tool.point", "laser.direction", "fixture.pose", "psd1.reading", "psd2.reading"),
     *("device.reading", "device.pose", "seat.position", "time"),
+    *("fixture*.pose", "seat*.position"),
 }
 PHYSICS = {
     "encoder-eccentricity",
@@ -48,14 +49,18 @@ PHYSICS = {
     "seat-moved",
     "tool-moved",
     "laser-moved",
+    "psd-local-defect",
+    "load-hysteresis",
+    "load-centre",
     "not-settled",
     "unknown",
 }
 FAMILY = {instrument: family for family, instrument in INSTRUMENT.items()}
-OF_EACH = [kind.INSTRUMENTS[k % len(kind.INSTRUMENTS)] for k, kind in enumerate(MECHANISMS)]
+ALL = (*MECHANISMS, *RAISED)
+OF_EACH = [kind.INSTRUMENTS[k % len(kind.INSTRUMENTS)] for k, kind in enumerate(ALL)]
 EVERYWHERE = [  # daily: every mechanism at one instrument, which takes turns with the others; each session is a search
     pytest.param(kind, instrument, marks=[] if instrument == one else pytest.mark.endure)
-    for kind, one in zip(MECHANISMS, OF_EACH, strict=True)
+    for kind, one in zip(ALL, OF_EACH, strict=True)
     for instrument in kind.INSTRUMENTS
 ]
 
@@ -113,7 +118,7 @@ def test_every_instrument_has_its_turn() -> None:
 
 
 def test_names_are_unique() -> None:
-    kinds = [kind.KIND for kind in MECHANISMS]
+    kinds = [kind.KIND for kind in ALL]
     assert len(set(kinds)) == len(kinds)
     assert len({kind.PHYSICS for kind in MECHANISMS} - {"unknown"}) >= 22
     assert sum(kind.PHYSICS == "unknown" for kind in MECHANISMS) >= 6
