@@ -97,6 +97,20 @@ def wrong_convention(flange: Flange, witnesses: Sequence[Witness]) -> Blunder | 
     return _named(found, tried, before)
 
 
+def wrong_table(flange: Flange, other: Flange, model: str, witnesses: Sequence[Witness]) -> Blunder | None:
+    """The table of the arm read as `model`, which `other` follows, where that explains the readings and the rig's own
+    reading of it does not; None otherwise. Flanges as in `wrong_convention`.
+    """
+    if not witnesses:
+        return None
+    before, after = (_Search(one, tuple(witnesses)).account(witnesses) for one in (flange, other))
+    if after.gross or not _explains(after, before):
+        return None
+    figures = f"(misfit {1e3 * after.strain.typical_m:.2g} mm, as written {1e3 * before.strain.typical_m:.3g} mm)"
+    what, remedy = f"the table is one of model '{model}' {figures}", f'state model = "{model}" in [arm] of the rig file'
+    return Blunder(BlunderKind.TABLE_CONVENTION, (), "rig file, arm.model", what, remedy)
+
+
 @dataclass(frozen=True)
 class _Search:
     flange: Flange

@@ -12,6 +12,8 @@ class BlunderKind(Enum):
     JOINT_SIGN = "joint counted the other way round"
     JOINT_OFFSET = "joint zero off by a quarter turn or more"
     JOINT_COUPLING = "joint angle counted from another link"
+    TABLE_CONVENTION = "table of the arm by another convention"
+    ANOTHER_ARM = "no arm of this table"
     MIRRORED_AXIS = "mirrored axis"
     MILLIMETRES = "lengths in millimetres"
     INVERTED_ROTATION = "orientation the other way round"

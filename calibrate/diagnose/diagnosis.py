@@ -18,7 +18,7 @@ Floats = NDArray[np.float64]
 
 UNKNOWN = "unknown"
 
-# Of what is said of drawn sessions so many are right (`calibeam prove`, seeds 2001 to 2003, 180 sessions): of names that
+# Of what is said of drawn sessions so many are right (`calibeam prove`, seeds 2001 to 2003, 180 sessions): names that
 # have no alternative 136 of 144, of places of what has no name 28 of 32, of names beside what nothing explains 8 of 22.
 NAMED, PLACED, NOT_FINAL = 0.95, 0.9, 0.4
 

@@ -40,6 +40,7 @@ Ints = NDArray[np.intp]
 
 FEWEST_IN_A_RUN = 3
 RUN_P = 1e-3  # a session in a thousand with gross errors at random
+FAR = 0.02  # of the reach
 FEWEST = 20  # samples: below, no term can be separated from noise, whatever it is
 
 
@@ -90,6 +91,8 @@ def diagnose_samples(
     geometry = stages.attempt(Stage.GEOMETRY, lambda: begin(session_of(rig, cleared.samples)), None, refuses=True)
     if geometry is None:
         return Diagnosed(cleared, cleared.blunders, None, stages.failed)
+    if wrong := _another_arm(geometry):
+        return Diagnosed(cleared, (*cleared.blunders, wrong), None, stages.failed)
 
     def causes(found: Diagnosis) -> None:
         if known is not None:
@@ -104,6 +107,25 @@ def diagnose_samples(
     diagnosis = _with_unexplained(diagnosis, together)
     physics = Physics(unfinished(diagnosis, stages.failed), geometry, model, change)
     return Diagnosed(cleared, cleared.blunders + left, physics)
+
+
+def _another_arm(geometry: Fitted) -> Blunder | None:
+    """Where the fitted arm stays far beside the readings: no physics moves an arm so, and what would be named is none.
+
+    Of readings that are lengths before the arm; spots on a detector are smaller than that, whatever is wrong.
+    """
+    flange = geometry.around.frames[:, -1, :3, 3]
+    reach_m = float(np.max(np.linalg.norm(flange - geometry.around.frames[:, 0, :3, 3], axis=1)))
+    for unseen in geometry.held_out(geometry.active):
+        away_m = float(np.median(np.linalg.norm(unseen.misfit[:, :3], axis=1)))
+        if unseen.instrument != ENCODER_DIFFERENCE and away_m > FAR * reach_m:
+            what = (
+                f"{1e3 * away_m:.3g} mm beside {unseen.instrument} wherever joint zeros, lengths, base and tool are put, "
+                f"{100.0 * away_m / reach_m:.2g} % of a reach of {reach_m:.2g} m: no arm of this table"
+            )
+            remedy = "look at the table, the order and signs of the joints, the units, and whether rows belong together"
+            return Blunder(BlunderKind.ANOTHER_ARM, (), "rig file, arm", what, remedy)
+    return None
 
 
 def unfinished(diagnosis: Diagnosis, failed: tuple[Incomplete, ...]) -> Diagnosis:

@@ -4,25 +4,26 @@ A fault of the whole file (angles in degrees, a mirrored axis, ...) is refused b
 docs/decisions/0003 states why rank comes before numbers and why the noise is estimated.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
+from msgspec import structs
 from numpy.random import Generator
 from numpy.typing import NDArray
 
 from acquisition.recording import Samples
 from acquisition.recording.files.bounds import ARM_M
-from acquisition.recording.rig import Rig
+from acquisition.recording.rig import ArmModel, Rig
 from acquisition.recording.samples import POSITION
 from calibrate.arms.catalogue import arm_of
-from calibrate.blunders.conventions import wrong_convention
+from calibrate.blunders.conventions import wrong_convention, wrong_table
 from calibrate.blunders.degrees import as_radians, beyond_limits
 from calibrate.blunders.finding import Blunder
 from calibrate.blunders.of_the_table import duplicated_rows, left_alone, rows_beyond_limits
 from calibrate.blunders.other_session import sessions_apart
 from calibrate.blunders.spot_signs import mirrored_axes
-from calibrate.blunders.witness import by_target
+from calibrate.blunders.witness import Witness, by_target
 from calibrate.errors import DataError
 from calibrate.estimator import Estimator
 from calibrate.fit_plan import DEFAULT, BesideName, FitPlan
@@ -41,6 +42,8 @@ from calibrate.sensors.catalogue import witnesses_of
 from calibrate.weighting import Weighting
 
 Floats = NDArray[np.float64]
+
+CONFUSED = {ArmModel.DH: ArmModel.MDH, ArmModel.MDH: ArmModel.DH}
 
 
 def identify(
@@ -119,10 +122,19 @@ def wrong_file(rig: Rig, samples: Samples) -> tuple[Blunder, ...]:
     in_degrees = beyond_limits(q_rad, limits_rad)
     if in_degrees is not None:
         q_rad = as_radians(q_rad, limits_rad)
-    found = wrong_convention(_drawn_flange(rig), witnesses_of(rig, samples, q_rad))
+    witnesses = witnesses_of(rig, samples, q_rad)
+    found = _wrong_table(rig, witnesses) or wrong_convention(_drawn_flange(rig), witnesses)
     if in_degrees is None and found is None:
         found = mirrored_axes(rig, samples)
     return tuple(blunder for blunder in (in_degrees, found) if blunder is not None)
+
+
+def _wrong_table(rig: Rig, witnesses: Sequence[Witness]) -> Blunder | None:
+    """The two ways to write a Denavit-Hartenberg table, which a data sheet hardly ever names."""
+    if (other := CONFUSED.get(rig.arm.model)) is None:
+        return None
+    by_other = structs.replace(rig, arm=structs.replace(rig.arm, model=other))
+    return wrong_table(_drawn_flange(rig), _drawn_flange(by_other), other.value, witnesses)
 
 
 def impossible_rows(rig: Rig, samples: Samples) -> tuple[Blunder, ...]:

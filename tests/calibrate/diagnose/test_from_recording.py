@@ -1,10 +1,13 @@
 """From a session folder to findings, for sessions of the concealed bench; truth is opened by the test alone."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from acquisition.recording import read
+from calibrate.blunders.finding import BlunderKind
 from calibrate.diagnose.diagnosis import Verdict
 from calibrate.diagnose.fitted import fit_geometry
 from calibrate.diagnose.from_recording import diagnose_samples, runs_of
@@ -12,6 +15,9 @@ from calibrate.diagnose.session import session_of
 from calibrate.diagnose.to_file import file_of
 from calibrate.errors import DataError
 from calibrate.physics.from_diagnosis import model_of_diagnosis
+from simulators.conceal.case import conceal
+from simulators.conceal.case_files import write_case
+from simulators.conceal.wanted import Wanted
 
 from .concealed import changed, recording_of
 
@@ -66,6 +72,25 @@ def test_a_file_that_is_wrong_as_a_whole_is_undecidable_and_says_why(recording):
 
 
 @pytest.mark.endure  # three seconds
+def test_a_table_by_the_other_convention_of_denavit_and_hartenberg_is_named(tmp_path):
+    write_case(conceal(Wanted("wire", 3, samples=80, confused=True)), tmp_path)
+    recording = read(tmp_path / "recording")
+    (fault,) = diagnose_samples(recording.rig, recording.samples, np.random.default_rng(1)).blunders
+    assert (fault.kind, fault.whole_file) == (BlunderKind.TABLE_CONVENTION, True)
+
+
+def test_an_arm_that_stays_far_beside_its_readings_has_no_findings(recording):
+    columns = dict(recording.samples.columns)
+    order = [f"q{joint}_rad" for joint in (3, 1, 2, 5, 6, 4)]  # columns that somebody has mixed up
+    mixed = replace(
+        recording.samples, columns=columns | {f"q{i + 1}_rad": columns[name] for i, name in enumerate(order)}
+    )
+    found = diagnose_samples(recording.rig, mixed, np.random.default_rng(1))
+    assert found.physics is None
+    assert found.blunders[-1].kind is BlunderKind.ANOTHER_ARM
+    assert found.blunders[-1].whole_file
+
+
 def test_readings_that_err_one_after_another_are_no_gross_errors_of_single_readings(tmp_path):
     """Neither rule has a name for what stood elsewhere for a while: the session is not consistent for all that."""
     recording = recording_of(tmp_path, family="tracker", seed=33, samples=120, arm="irb120")
