@@ -107,7 +107,8 @@ def wrong_table(flange: Flange, other: Flange, model: str, witnesses: Sequence[W
     if after.gross or not _explains(after, before):
         return None
     figures = f"(misfit {1e3 * after.strain.typical_m:.2g} mm, as written {1e3 * before.strain.typical_m:.3g} mm)"
-    what, remedy = f"the table is one of model '{model}' {figures}", f'state model = "{model}" in [arm] of the rig file'
+    what = f"the table follows the other convention of Denavit and Hartenberg, model '{model}' {figures}"
+    remedy = f'state model = "{model}" in [arm] of the rig file'
     return Blunder(BlunderKind.TABLE_CONVENTION, (), "rig file, arm.model", what, remedy)
 
 

@@ -120,7 +120,7 @@ def _another_arm(geometry: Fitted) -> Blunder | None:
         away_m = float(np.median(np.linalg.norm(unseen.misfit[:, :3], axis=1)))
         if unseen.instrument != ENCODER_DIFFERENCE and away_m > FAR * reach_m:
             what = (
-                f"{1e3 * away_m:.3g} mm beside {unseen.instrument} wherever joint zeros, lengths, base and tool are put, "
+                f"{1e3 * away_m:.3g} mm beside {unseen.instrument} whatever zeros, lengths, base and tool are, "
                 f"{100.0 * away_m / reach_m:.2g} % of a reach of {reach_m:.2g} m: no arm of this table"
             )
             remedy = "look at the table, the order and signs of the joints, the units, and whether rows belong together"
