@@ -123,7 +123,7 @@ def _another_arm(geometry: Fitted) -> Blunder | None:
                 f"{1e3 * away_m:.3g} mm beside {unseen.instrument} whatever zeros, lengths, base and tool are, "
                 f"{100.0 * away_m / reach_m:.2g} % of a reach of {reach_m:.2g} m: no arm of this table"
             )
-            remedy = "look at the table, the order and signs of the joints, the units, and whether rows belong together"
+            remedy = "check the table, the order and signs of the joints, the units, and whether rows belong together"
             return Blunder(BlunderKind.ANOTHER_ARM, (), "rig file, arm", what, remedy)
     return None
 

@@ -61,8 +61,9 @@ def _forbidden(at: Search, families: Families, given_up: frozenset[Keys]) -> tup
     """With the names given up that an open family beats, the clearest case first; and which ones they were."""
     gone: frozenset[Keys] = frozenset()
     for case in sorted(_cases(at, families, given_up), key=lambda case: -case.margin):
-        if not case.keys <= at.keys:
-            continue  # some of these names went with another case
+        others = [a.term for a in at.state.accepted if a.term.key not in case.keys]
+        if not case.keys <= at.keys or any(_balance(case.offer.term, other) for other in others):
+            continue  # some of these names went with another case, or its curve is there already
         trial = _without_names(at, case)
         if trial.bench.bic < at.bench.bic - _enough(at, len(case.keys)):
             at, gone = trial, gone | {case.keys}
