@@ -1,7 +1,8 @@
 """What the models of real recordings are worth on rows that neither search nor fit has seen. No truth is known.
 
 Every fifth of fifty blocks in time is kept away; the rest is identified and diagnosed, and the model files of both
-predict: single rows beside their neighbours would be half seen. One line a fold, as docs/real-data.md shows them.
+predict: single rows beside their neighbours would be half seen. Nominal is the arm as drawn, device and target where
+these very rows have them best. One line a fold, as docs/real-data.md shows them.
 """
 
 import tempfile
@@ -22,7 +23,7 @@ from calibrate.physics.predicting import predict_with_physics
 
 BLOCKS, FOLDS = 50, 5
 XYZ = ("x_m", "y_m", "z_m")
-HEAD = "| set | rows seen, unseen | fold | geometry | model | ratio | own rows, mean vector | CPU | confidences |"
+HEAD = "| set | rows seen, unseen | fold | nominal | geometry | model | ratio | own rows, mean vector | CPU | said |"
 
 
 def lines(data: Path) -> Iterator[str]:
@@ -43,6 +44,7 @@ def _line(recording: Recording, fold: int, name: str) -> str:
     block = np.arange(len(recording.samples)) * BLOCKS // len(recording.samples)
     seen, unseen = np.flatnonzero(block % FOLDS != fold), np.flatnonzero(block % FOLDS == fold)
     known, asked = (replace(recording, samples=recording.samples.take(rows)) for rows in (seen, unseen))
+    nominal = 1e6 * identify_session(asked).instruments[0].rms_distance_before_m
     geometry = _rms_um(_errors_m(session_model(identify_session(known), known), asked))
     before = time.process_time()
     found, file = diagnose_recording(known)
@@ -50,10 +52,11 @@ def _line(recording: Recording, fold: int, name: str) -> str:
     model = _through_a_file(model_of_diagnosis(found, known))
     physics, own = _rms_um(_errors_m(model, asked)), _errors_m(model, known)
     mean = ", ".join(f"{1e6 * v:.1f}" for v in np.mean(own, axis=0))
-    names = ", ".join(f"{f.confidence:.3f}" for f in file.findings)
+    names = [f"{f.physics} {f.where} {f.confidence:.2f}" for f in file.findings]
+    left = [] if file.unexplained is None else [f"unexplained: {file.unexplained.says.split(';')[0]}"]
     return (
-        f"| `{name}` | {len(seen)}, {len(unseen)} | {fold} | {geometry:.1f} µm | {physics:.1f} µm | "
-        f"{physics / geometry:.3f} | {_rms_um(own):.1f} ({mean}) µm | {cpu_s:.0f} s | {names} |"
+        f"| `{name}` | {len(seen)}, {len(unseen)} | {fold} | {nominal:.0f} µm | {geometry:.1f} µm | {physics:.1f} µm | "
+        f"{physics / geometry:.3f} | {_rms_um(own):.1f} ({mean}) µm | {cpu_s:.0f} s | {'; '.join([*names, *left])} |"
     )
 
 
