@@ -1,8 +1,8 @@
 """A session with geometry and terms fitted together: robust, with the noise that the residuals show.
 
 Weights and least squares take turns (calibrate/diagnose/scatter.py); drivers that the model predicts are refreshed in
-between. Where several rows are distrusted, a new term that could make them so is tried from unit weights, too: data of a
-moved seat resemble outliers to the model before it.
+between. Where several rows are distrusted, a new term that could make them so is tried from unit weights, too: data of
+a moved seat resemble outliers to the model before it.
 """
 
 from collections.abc import Sequence

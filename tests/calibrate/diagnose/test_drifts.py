@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from calibrate.diagnose.diagnosis import Finding, Named, RivalName
+from calibrate.diagnose.diagnosis import NOT_FINAL, Finding, Named, RivalName
 from calibrate.diagnose.drifts import doubtful, suspects, untold
 from calibrate.effects.term import Missing
 
@@ -23,15 +23,15 @@ def columns(finding, missing):
 
 def test_a_drift_may_follow_a_temperature_that_was_not_recorded():
     assert columns(found("base.pose", "base-moved"), WARMTH) == ("temp_room_degC",)
-    assert doubtful(found("base.pose", "base-moved")).confidence == pytest.approx(0.5)
+    assert doubtful(found("base.pose", "base-moved")).confidence == pytest.approx(NOT_FINAL)
 
 
 def test_what_makes_a_name_less_sure_makes_no_alternative_likelier_than_it():
     other = RivalName(Named("device.pose", ("t",), "exponential", None, "device-drift"), 0.4, 0.1, refitted=True)
     finding = replace(found("base.pose", "base-moved"), confidence=0.6, rivals=(other,))
     (less,) = doubtful(finding).rivals
-    assert doubtful(finding).confidence == pytest.approx(0.5)
-    assert less.confidence == pytest.approx(0.4 * 0.5 / 0.6)
+    assert doubtful(finding).confidence == pytest.approx(NOT_FINAL)
+    assert less.confidence == pytest.approx(0.4 * NOT_FINAL / 0.6)
 
 
 def test_what_does_not_drift_follows_no_temperature():
