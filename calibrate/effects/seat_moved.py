@@ -1,10 +1,9 @@
-"""A cone slid, or the plate with all of them: from some moment on they are elsewhere."""
+"""A cone slid: from some moment on its centre is elsewhere."""
 
 import numpy as np
 
 from calibrate.effects import time_laws
 from calibrate.effects.drivers import Drivers
-from calibrate.effects.fixture_moved import ONE_BODY
 from calibrate.effects.kind import Kind
 from calibrate.effects.moved import in_use, motion
 from calibrate.effects.term import Holds, Shape, Term
@@ -16,10 +15,6 @@ def _terms(drivers: Drivers) -> tuple[Term, ...]:
     if seats is None or seats.place is None:
         return ()
     out: list[Term] = []
-    if len(np.unique(seats.place[seats.seen])) > 1 and (inner := time_laws.step_inner(drivers, seats.seen)):
-        there = in_use(seats.seen)
-        step = ("seat.position", "seat-moved", "t", Shape.STEP, time_laws.step, "The plate with all cones")
-        out.append(motion(*step, inner, there, variant=ONE_BODY))
     for seat in np.unique(seats.place[seats.seen]).tolist():
         in_seat = seats.seen & (seats.place == seat)
 
