@@ -1,8 +1,8 @@
 """What the models of real recordings are worth on rows that neither search nor fit has seen. No truth is known.
 
 Every fifth of fifty blocks in time is kept away; the rest is identified and diagnosed, and the model files of both
-predict: single rows beside their neighbours would be half seen. Nominal is the arm of the data sheet, device and target where
-these very rows have them best. One line a fold, as docs/real-data.md shows them.
+predict: single rows beside their neighbours would be half seen. Nominal is the arm of the data sheet, with device and
+target fitted to these very rows. One line a fold, as docs/real-data.md shows them.
 """
 
 import tempfile
@@ -23,7 +23,7 @@ from calibrate.physics.predicting import predict_with_physics
 
 BLOCKS, FOLDS = 50, 5
 XYZ = ("x_m", "y_m", "z_m")
-HEAD = "| set | rows seen, unseen | fold | nominal | geometry | model | ratio | own rows, mean vector | CPU | reported |"
+HEAD = "| set | rows seen, unseen | fold | nominal | geometry | model | ratio | own rows, mean vector | CPU | found |"
 
 
 def lines(data: Path) -> Iterator[str]:
