@@ -124,7 +124,7 @@ class Augmented:
 
     def refreshed(self, drivers: Drivers) -> "Augmented":
         """The same with other drivers."""
-        return replace(self, drivers=drivers, last={}, slopes={}, added={})
+        return self if drivers is self.drivers else replace(self, drivers=drivers, last={}, slopes={}, added={})
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:

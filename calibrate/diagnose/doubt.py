@@ -137,7 +137,8 @@ def _found(state: State, rng: Generator, stages: Stages) -> Search:
 def _named_best(at: Search) -> tuple[Search, Rivals]:
     at, rivals = with_best_names(at)
     kept = _predicting(at)
-    return (at, rivals) if kept is at else with_best_names(kept)
+    at, rivals = (at, rivals) if kept is at else with_best_names(kept)
+    return (at.at(Bench(at.state.renewed())) if at.state.accepted else at), rivals
 
 
 def _predicting(at: Search) -> Search:

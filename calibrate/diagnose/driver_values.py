@@ -15,6 +15,8 @@ from calibrate.weighting import Measured
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
+HARDLY = 1e-2  # of the reach, rad, of the range of readings: an effect may be off by as much until drivers are renewed
+
 
 def drivers_of(session: Session, frames: Floats, expected: Mapping[str, Floats], own: Mapping[str, Floats]) -> Drivers:
     """At frames (sample, joint + 1, 4, 4) and expected readings (row, k) of each instrument, with the values of its own
@@ -30,6 +32,28 @@ def drivers_at(
     """Of any table of samples, with what the model predicts at them; temperatures (sample,) by place."""
     taken = conditions_of(uncoupled_samples(rig.arm, samples), temperatures_degC)
     return Drivers(**vars(taken), rig=rig, frames=frames, readouts=readouts)
+
+
+def as_before(old: Drivers, new: Drivers) -> bool:
+    """Whether what two states predict at the same samples is the same to an effect on top of them."""
+    moved, reach_m = np.abs(new.frames - old.frames), np.abs(old.frames[..., :3, 3]).max(initial=0.0)
+    if moved[..., :3].max(initial=0.0) > HARDLY or moved[..., :3, 3].max(initial=0.0) > HARDLY * reach_m:
+        return False
+    return all(_reads_as(old.readouts[name], now) for name, now in new.readouts.items())
+
+
+def _reads_as(old: Readout, new: Readout) -> bool:
+    for was, now, least in (
+        (old.predicted, new.predicted, 0.0),
+        (old.incidence_rad, new.incidence_rad, 1.0),
+        (old.lean, new.lean, 1.0),
+    ):
+        if was is None or now is None or not new.seen.any():
+            continue
+        range_ = np.maximum(np.ptp(was[new.seen], axis=0), least)
+        if np.any(np.abs(now - was)[new.seen] > HARDLY * range_):
+            return False
+    return True
 
 
 def _readout(measured: Measured, expected: Floats, own: Floats, frames: Floats) -> Readout:

@@ -9,6 +9,7 @@ from calibrate.diagnose.bench import Bench
 from calibrate.diagnose.growing import admissible
 from calibrate.diagnose.linearised import Accepted
 from calibrate.diagnose.null import is_slow
+from calibrate.diagnose.pruning import balances
 from calibrate.diagnose.score import gain_of, removed, scores
 from calibrate.diagnose.searching import BETTER, Key, Search, taken
 
@@ -37,7 +38,7 @@ def swapped(at: Search) -> Search:
         _, i, proposed = best
         old = at.state.accepted[i].term.key
         bench = Bench(at.state.refitted([proposed if j == i else a for j, a in enumerate(at.state.accepted)]))
-        if bench.bic < at.bench.bic - BETTER and bench.plausible[i]:
+        if bench.bic < at.bench.bic - BETTER and bench.plausible[i] and not balances(bench, at.bench):
             p = {k: v for k, v in at.p.items() if k != old} | {proposed.term.key: at.p.get(old, 0.0)}
             at = replace(at.at(bench), p=p)
         else:

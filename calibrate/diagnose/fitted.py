@@ -14,13 +14,13 @@ from numpy.typing import NDArray
 
 from calibrate.diagnose.assumed import Assumed
 from calibrate.diagnose.augmented import Around, Augmented, plain_sizes
-from calibrate.diagnose.driver_values import drivers_of
+from calibrate.diagnose.driver_values import as_before, drivers_of
 from calibrate.diagnose.in_sight import in_sight, solve_in_sight
 from calibrate.diagnose.linearised import Accepted, Rows, Unseen
+from calibrate.diagnose.listed import Listed
 from calibrate.diagnose.noise_of_fit import Noise, covariance_at, noise_of, whiteners_of
 from calibrate.diagnose.scatter import Scatter, likelihood_of
 from calibrate.diagnose.session import Session
-from calibrate.effects.catalogue import terms_of
 from calibrate.effects.drivers import Drivers
 from calibrate.effects.form import Form
 from calibrate.effects.ports import Port
@@ -63,6 +63,7 @@ class Fitted:
     covariance: Floats  # (value, value) posterior; zero for held ones
     steps: int = 0  # of the solver, in all rounds of weights
     stop: Stop = Stop.ROUNDS  # the rule that ended the last round
+    before: Listed | None = None  # of the state that this one was refitted from
 
     @cached_property
     def _split(self) -> tuple[Floats, tuple[Accepted, ...]]:
@@ -106,15 +107,27 @@ class Fitted:
 
     @property
     def drivers(self) -> Drivers:
-        """As this state predicts them."""
+        """As this state predicts them, or those that it was fitted with where they are hardly others."""
         return self._drivers
 
     @cached_property
     def _drivers(self) -> Drivers:
+        last = self.problem.drivers
+        return last if last is not None and as_before(last, self.predicted) else self.predicted
+
+    @cached_property
+    def predicted(self) -> Drivers:
+        """Drivers at these very values."""
         joint, session = self.session.weighting.unweighted, self.session
         expected = {m.name: e for m, e in zip(session.measured, self.around.expected, strict=True)}
         own = {m.name: joint.of_block(i, self.geometry) for i, m in enumerate(session.measured)}
         return drivers_of(session, self.around.frames, expected, own)
+
+    @cached_property
+    def listed(self) -> Listed:
+        """The catalogue at these drivers."""
+        kept = self.before
+        return kept if kept is not None and kept.drivers is self.drivers else Listed(self.drivers)
 
     @property
     def rows(self) -> Rows:
@@ -167,26 +180,39 @@ class Fitted:
         return sum(s.minus_two_log_likelihood for s in self.scatters) + float(away @ away + known @ known)
 
     def columns(self, term: Term, inner: Floats) -> Floats:
-        data = [part.reshape(-1, part.shape[-1]) for part in self._felt(term.port, term.basis(self.drivers, inner))]
+        data = [part.reshape(-1, part.shape[-1]) for part in self._felt(term, inner)]
         rest = len(self.rows.residual) - len(self._labels[0])
         return np.concatenate([*data, np.zeros((rest, data[0].shape[1]))])
 
-    def _felt(self, port: Port, basis: Floats) -> Sequence[Floats]:
-        """Of each instrument (active row, k, m) whitened, what a port adds (sample, width, m).
+    def _felt(self, term: Term, inner: Floats) -> Sequence[Floats]:
+        """Of each instrument (active row, k, m) whitened, what a term adds.
 
-        A search asks for thousands: where a row follows one sample alone, by what each component of the port does.
+        A search asks for thousands: where a row follows one sample alone, by what each direction of the port does.
         """
-        measured, problem = self.session.measured, self.problem
+        measured, problem, drivers = self.session.measured, self.problem, self.drivers
         if problem.shared is not None or any(m.sample_rows.shape[1] > 1 for m in measured):
-            return problem.whitened(problem.columns(port, basis, self.around))
-        if port not in self._levers:
-            each = np.broadcast_to(np.eye(basis.shape[1]), (len(basis), basis.shape[1], basis.shape[1]))
-            self._levers[port] = problem.whitened(problem.columns(port, each, self.around))
+            return problem.whitened(problem.columns(term.port, term.basis(drivers, inner), self.around))
         samples = [m.sample_rows[rows, 0] for m, rows in zip(measured, problem.rows, strict=True)]
-        return [lever @ basis[sample] for lever, sample in zip(self._levers[port], samples, strict=True)]
+        if not isinstance(term, Form) or term.directions is None:
+            basis = self.listed.function(term, inner) if isinstance(term, Form) else term.basis(drivers, inner)
+            levers = self._lever(term.port, np.eye(basis.shape[1]))
+            return [lever @ basis[sample] for lever, sample in zip(levers, samples, strict=True)]
+        values, levers = self.listed.function(term, inner), self._lever(term.port, term.directions)
+        return [
+            (lever[:, :, None, :] * values[sample][:, None, :, None]).reshape(*lever.shape[:2], -1)
+            for lever, sample in zip(levers, samples, strict=True)
+        ]
+
+    def _lever(self, port: Port, directions: Floats) -> list[Floats]:
+        """Of each instrument (active row, k, d) whitened, what directions (width, d) of a port do."""
+        key = (port, directions.tobytes())
+        if key not in self._levers:
+            each = np.broadcast_to(directions, (len(self.around.frames), *directions.shape))
+            self._levers[key] = self.problem.whitened(self.problem.columns(port, each, self.around))
+        return self._levers[key]
 
     @cached_property
-    def _levers(self) -> dict[Port, list[Floats]]:
+    def _levers(self) -> dict[tuple[Port, bytes], list[Floats]]:
         return {}
 
     def candidates(self) -> Sequence[Term]:
@@ -195,7 +221,7 @@ class Fitted:
     @cached_property
     def _candidates(self) -> tuple[Term, ...]:
         """Closed and open menus and the ports ask for them in turn."""
-        assumed, every = self.problem.assumed, terms_of(self.drivers)
+        assumed, every = self.problem.assumed, self.listed.terms
         if assumed is None:
             return every
         if assumed.of_difference:
@@ -207,7 +233,10 @@ class Fitted:
         fits = [self._refitted(tuple(accepted), self.noise)]
         if swallowed and any(a.term.key not in kept and _makes_outliers(a.term) for a in accepted):
             fits.append(self._refitted(tuple(accepted), self.noise.trusted))
-        return min(fits, key=lambda fit: fit.minus_two_log_likelihood)
+        return replace(min(fits, key=lambda fit: fit.minus_two_log_likelihood), before=self.listed)
+
+    def renewed(self) -> "Fitted":
+        return _settled(self, renewing=True)
 
     def select(self, samples: Ints) -> "Fitted":
         return _cut(self, np.sort(samples))
@@ -283,20 +312,21 @@ def _makes_outliers(term: Term) -> bool:
     return term.slow or term.open
 
 
-def _settled(fitted: Fitted) -> Fitted:
+def _settled(fitted: Fitted, renewing: bool = False) -> Fitted:
     """Weights and least squares in turns, until the solver is at rest and the likelihood changes no more; not settled,
     but no longer either, where a turn changes it so little that all turns together would decide nothing.
 
     Of turns that differ in what they take noise for, the likeliest: no refit ends worse than it was. Derivatives may be
-    kept from turn to turn, but the turn that ends it begins with those of its own values.
+    kept from turn to turn, but the turn that ends it begins with those of its own values. `renewing`: with drivers as
+    every turn predicts them.
     """
     best, resting = fitted, False
     for turn in range(1, TURNS):
         last, problem = fitted, fitted.problem
         anew = resting or turn + 1 == FEWEST_TURNS
         problem = problem.forgetting() if anew else problem
-        if fitted.problem.terms and turn <= REFRESHED:
-            problem = problem.refreshed(last.drivers)
+        if fitted.problem.terms and (renewing or turn <= REFRESHED):
+            problem = problem.refreshed(last.predicted if renewing else last.drivers)
         new = _turn(problem, fitted.active, fitted.values, fitted.noise, LAST if anew else TOLERANCE)
         fitted = replace(new, steps=fitted.steps + new.steps)
         best = min(best, fitted, key=lambda fit: fit.minus_two_log_likelihood)

@@ -111,6 +111,10 @@ class State(Protocol):
         """Joint non-linear refit of geometry and these terms from the values given; noise and weights follow."""
         ...
 
+    def renewed(self) -> Self:
+        """Fitted again, with drivers at its own values: on the way they may be those of a state before."""
+        ...
+
     def select(self, samples: Ints) -> Self:
         """The same model over some of the samples, not refitted."""
         ...

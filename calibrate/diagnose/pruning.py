@@ -44,14 +44,25 @@ def tidied(at: Search) -> Search:
 
 def surrogates(bench: Bench) -> list[int]:
     """Of every port whose terms all but cancel each other, the one that is worth least: no machine balances itself."""
+    return [min(mine, key=lambda i: bench.gone[i].squares) for mine in balanced(bench).values()]
+
+
+def balanced(bench: Bench) -> dict[str, list[int]]:
+    """Accepted terms by port, where they all but cancel each other."""
     accepted = bench.state.accepted
     felt = np.stack([bench.behind(a) for a in accepted])
-    out: list[int] = []
-    for where in sorted({a.term.port.where for a in accepted}):
-        mine = [i for i, a in enumerate(accepted) if a.term.port.where == where]
-        if len(mine) > 1 and np.sum(felt[mine].sum(axis=0) ** 2) < CANCELS * np.sum(felt[mine] ** 2):
-            out.append(min(mine, key=lambda i: bench.gone[i].squares))
-    return out
+    ports = {a.term.port.where for a in accepted}
+    mine = {where: [i for i, a in enumerate(accepted) if a.term.port.where == where] for where in sorted(ports)}
+    return {
+        where: at
+        for where, at in mine.items()
+        if len(at) > 1 and np.sum(felt[at].sum(axis=0) ** 2) < CANCELS * np.sum(felt[at] ** 2)
+    }
+
+
+def balances(new: Bench, old: Bench) -> bool:
+    """Whether terms of a port all but cancel each other that did not before: what prunes would take the new one away."""
+    return not balanced(new).keys() <= balanced(old).keys()
 
 
 def without(at: Search, i: int) -> Search:
@@ -63,9 +74,12 @@ def without(at: Search, i: int) -> Search:
 
 
 def confirmed(at: Search) -> Search:
-    """Each term against the null of the final residual; the least significant one goes first."""
-    while at.state.accepted:
-        null = null_at(at.bench, at.rng)
+    """Each term against the null of the final residual; the least significant one goes first.
+
+    One null for all: what goes would be taken for noise that wanders in the next one, and take others with it.
+    """
+    null = null_at(at.bench, at.rng) if at.state.accepted else None
+    while null is not None and at.state.accepted:
         p = {a.term.key: p_of(at.bench, null, i) for i, a in enumerate(at.state.accepted)}
         at = replace(at, p=p)
         values = np.array([p[a.term.key] for a in at.state.accepted])

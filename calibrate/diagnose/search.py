@@ -45,10 +45,11 @@ def grown_out(at: Search) -> Search:
         new = unswallowed(open_to) if new is None else new
         if new is None and (new := merged(at)) is at:
             break
-        trial = tidied(swapped(new))
+        exchanged = swapped(new)
+        trial = tidied(exchanged)
         if trial.bench.bic < at.bench.bic - BETTER:
             at = trial
-        elif added := new.keys - at.keys - vain:
+        elif added := (new.keys | exchanged.keys) - at.keys - vain:
             vain |= added
         else:
             break

@@ -46,14 +46,16 @@ class Case:
 
 def with_unknowns(at: Search) -> Search:
     """Names replaced where an open family forbids them, curves added where structure remains."""
-    start, given_up = at, frozenset[Keys]()
+    start, given_up, vain = at, frozenset[Keys](), frozenset[Key]()
     for _ in range(ROUNDS):
         changed, gone = _forbidden(at, open_families(at.bench), given_up)
         given_up |= gone
-        changed = _filled(changed, grown=changed is at)
+        changed = _filled(changed, vain, grown=changed is at)
         if changed is at:
             break
-        at = grown_out(changed)
+        new = grown_out(changed)
+        vain |= changed.keys - new.keys  # added, and gone again: the next round would do the same
+        at = at if new.keys == at.keys else new
     return at if at is start else settled(at)
 
 
@@ -124,14 +126,14 @@ def cancel(bench: Bench, group: Sequence[int]) -> bool:
     return bool(total @ total < CANCELS * sum(float(f @ f) for f in felt))
 
 
-def _filled(at: Search, grown: bool) -> Search:
-    """With open terms for structure that is significant against the null of all open families.
+def _filled(at: Search, vain: frozenset[Key], grown: bool) -> Search:
+    """With open terms, none of them `vain`, for structure that is significant against the null of all open families.
 
     `grown`: no name is left that could be added; else a curve has to be better than any, too.
     """
     for turn in range(CURVES):
         least = 0.0 if grown and turn == 0 else _best_name(at) + FORBIDS
-        more = _remaining(at, least)
+        more = _remaining(at, vain, least)
         if more is None:
             return at
         at = more
@@ -152,14 +154,14 @@ def _p_of(at: Search, families: Families, law: NoiseLaw, offer: Offer, allowed: 
     return Tail(families.maxima(left, allowed)).p(offer.gain)
 
 
-def _remaining(at: Search, least: float) -> Search | None:
-    """With the best open term of more than the `least` gain."""
+def _remaining(at: Search, vain: frozenset[Key], least: float) -> Search | None:
+    """With the best open term of more than the `least` gain that is not `vain`."""
     families = open_families(at.bench)
     law = noise_law(at.state.rows, at.bench.sight, at.state.drivers.t_s, at.rng)
     free = _beside([a.term for a in at.state.accepted])
 
     def allowed(term: Term) -> bool:
-        return free(term) and not (law.wanders and is_slow(term))
+        return free(term) and term.key not in vain and not (law.wanders and is_slow(term))
 
     offer = families.best(None, allowed, least)
     p = 1.0 if offer is None else _p_of(at, families, law, offer, allowed)
