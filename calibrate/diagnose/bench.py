@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,8 @@ from calibrate.effects.term import Term
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
+
+RECENT = 4  # menus that are kept, of closed terms and open ones: they are most of what a diagnosis holds
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,17 +48,15 @@ class Bench:
         """All terms that could be seen at their place."""
         return tuple(term for term in self.state.candidates() if term.port.where not in self.blind)
 
-    @cached_property
+    @property
     def menu(self) -> Menu:
         """Closed terms: those that name physics."""
-        if self.given is not None:
-            return self.given
-        return self.menu_of(tuple(term for term in self.candidates if not term.open))
+        return recent_menu(self, False) if self.given is None else self.given
 
-    @cached_property
+    @property
     def open_menu(self) -> Menu:
         """Open families of the catalogue: they compete, but name nothing."""
-        return self.menu_of(tuple(term for term in self.candidates if term.open))
+        return recent_menu(self, True)
 
     @cached_property
     def scores(self) -> Scores:
@@ -130,3 +130,9 @@ class Bench:
         behind = self.behind(self.state.accepted[i])
         alone = self.gone[i].span.T @ self.contribution(self.state.accepted[i])
         return float(alone @ alone / max(behind @ behind, 1e-300))
+
+
+@lru_cache(maxsize=RECENT)
+def recent_menu(bench: Bench, open_: bool) -> Menu:
+    """Of closed terms or open families at a state; made anew where a search comes back to an older one."""
+    return bench.menu_of(tuple(term for term in bench.candidates if term.open is open_))

@@ -27,7 +27,7 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from calibrate.diagnose.bench import Bench
+from calibrate.diagnose.bench import Bench, recent_menu
 from calibrate.diagnose.diagnosis import UNKNOWN, Finding, Unexplained, Verdict
 from calibrate.diagnose.drifts import suspects
 from calibrate.diagnose.drifts import untold as drift_untold
@@ -122,6 +122,7 @@ def doubted(
     if left and not lacking:
         lacking = list(missing)
     unexplained = (*left, *(drift_untold(f, hidden) for f, hidden in drifts))
+    recent_menu.cache_clear()
     return Doubted(at, findings, unexplained, misfit, records(lacking), stages.undecided)
 
 

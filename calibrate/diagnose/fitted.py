@@ -194,7 +194,7 @@ class Fitted:
             return problem.whitened(problem.columns(term.port, term.basis(drivers, inner), self.around))
         samples = [m.sample_rows[rows, 0] for m, rows in zip(measured, problem.rows, strict=True)]
         if not isinstance(term, Form) or term.directions is None:
-            basis = self.listed.function(term, inner) if isinstance(term, Form) else term.basis(drivers, inner)
+            basis = term.basis(drivers, inner)
             levers = self._lever(term.port, np.eye(basis.shape[1]))
             return [lever @ basis[sample] for lever, sample in zip(levers, samples, strict=True)]
         values, levers = self.listed.function(term, inner), self._lever(term.port, term.directions)

@@ -27,8 +27,8 @@ class Listed:
         return terms_of(self.drivers)
 
     def function(self, term: Form, inner: Floats) -> Floats:
-        """(sample, m) along each direction of a term; kept at values of the grid, which every menu asks for."""
-        if not all(value in spec.grid for value, spec in zip(inner, term.inner, strict=False)):
+        """(sample, m) along each direction of a term; kept where a menu asks for it and it costs more than to keep it."""
+        if term.open or not all(value in spec.grid for value, spec in zip(inner, term.inner, strict=False)):
             return term.function(self.drivers, inner)
         key = (term.function, inner.tobytes())
         if key not in self.values:

@@ -45,15 +45,20 @@ def grown_out(at: Search) -> Search:
         new = unswallowed(open_to) if new is None else new
         if new is None and (new := merged(at)) is at:
             break
-        exchanged = swapped(new)
-        trial = tidied(exchanged)
+        trial, tried = _at_rest(new)
         if trial.bench.bic < at.bench.bic - BETTER:
             at = trial
-        elif added := (new.keys | exchanged.keys) - at.keys - vain:
+        elif added := tried - at.keys - vain:
             vain |= added
         else:
             break
     return at
+
+
+def _at_rest(new: Search) -> tuple[Search, frozenset[Key]]:
+    """Swapped and pruned; and the keys that were in it on the way."""
+    exchanged = swapped(new)
+    return tidied(exchanged), new.keys | exchanged.keys
 
 
 def unswallowed(at: Search) -> Search | None:

@@ -46,7 +46,7 @@ class Case:
 
 def with_unknowns(at: Search) -> Search:
     """Names replaced where an open family forbids them, curves added where structure remains."""
-    start, given_up, vain = at, frozenset[Keys](), frozenset[Key]()
+    before, given_up, vain = at.keys, frozenset[Keys](), frozenset[Key]()
     for _ in range(ROUNDS):
         changed, gone = _forbidden(at, open_families(at.bench), given_up)
         given_up |= gone
@@ -56,7 +56,7 @@ def with_unknowns(at: Search) -> Search:
         new = grown_out(changed)
         vain |= changed.keys - new.keys  # added, and gone again: the next round would do the same
         at = at if new.keys == at.keys else new
-    return at if at is start else settled(at)
+    return at if at.keys == before else settled(at)
 
 
 def _forbidden(at: Search, families: Families, given_up: frozenset[Keys]) -> tuple[Search, frozenset[Keys]]:
