@@ -37,7 +37,7 @@ NEAR = 1e-5  # m, rad: directions that the data hardly see are differences of co
 INNER_STEP = 1e-3  # of the range of an inner parameter, for its difference quotient
 PART_STEP = 1e-3  # m, rad: whether a part of the arm follows a parameter at all
 KEPT = 8  # arms of which that is remembered
-FEW = 0.75  # of the samples: where a fit sees fewer, derivatives are computed of those alone
+FEW = 0.9  # of the samples: where a fit sees fewer, derivatives are computed of those alone
 LOOSE = 1e3  # times the size that would be plain to see: prior about a coefficient, so that none is ever singular
 
 

@@ -17,7 +17,7 @@ from calibrate.effects.term import Term
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 
-RECENT = 4  # menus that are kept, of closed terms and open ones: they are most of what a diagnosis holds
+RECENT = 2  # menus that are kept, of closed terms and open ones: they are most of what a diagnosis holds
 
 
 @dataclass(frozen=True, eq=False)

@@ -64,7 +64,7 @@ RIDGE = 1e-9  # keeps a direction that only one fold knows finite
 
 Ints = NDArray[np.intp]
 
-MOST = 1800  # rows, 600 positions: an effect of a fifth of the noise is plain to see in so many
+MOST = 1200  # rows, 400 positions: an effect of a quarter of the noise is plain to see in so many
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,10 +97,13 @@ def doubted(
     `stages` keeps what fails; `known` is called once as soon as the causes are known, before alternatives and sizes.
     """
     stages = Stages() if stages is None else stages
-    at = _found(state, rng, stages)
+    few = _found(state, rng, stages)
+    at = _of_all(few, state)
     if known is not None:
         known(Doubted(at, bare_findings(at), (), None, (), undecided=True))
-    at, rivals = stages.attempt(Stage.ALTERNATIVES, lambda: _named_best(at), (at, tuple(() for _ in at.state.accepted)))
+    nameless = tuple(() for _ in few.state.accepted)
+    few, rivals = stages.attempt(Stage.ALTERNATIVES, lambda: _named_best(few), (few, nameless))
+    at = _renewed(at if at.keys == few.keys else _of_all(few, state))
     scatter = stages.attempt(Stage.SCATTER, lambda: unrecorded(at.bench, rng, missing), None)
     misfit = stages.attempt(Stage.REPEATS, lambda: lack_of_fit(at.bench), None)
     lasting = stages.attempt(Stage.TIME, lambda: time_left(at.bench, rng), None)
@@ -127,19 +130,26 @@ def doubted(
 
 
 def _found(state: State, rng: Generator, stages: Stages) -> Search:
-    """Every cause, in a model fitted to all samples; where a stage fails, what the stages before it have found."""
+    """Every cause, of samples enough to see them; where a stage fails, what the stages before it have found."""
     few = stages.attempt(Stage.SEARCH, lambda: thinned(state, rng), state)
     at = stages.attempt(Stage.SEARCH, lambda: search(few, rng), Search(Bench(few), rng))
     at = stages.attempt(Stage.UNKNOWN, lambda: with_unknowns(at), at)
-    at = stages.attempt(Stage.PREDICTION, lambda: _predicting(at), at)
+    return stages.attempt(Stage.PREDICTION, lambda: _predicting(at), at)
+
+
+def _of_all(at: Search, state: State) -> Search:
+    """The same model fitted to all samples."""
     return at.at(Bench(state.refitted(at.state.accepted))) if at.state.samples < state.samples else at
+
+
+def _renewed(at: Search) -> Search:
+    return at.at(Bench(at.state.renewed())) if at.state.accepted else at
 
 
 def _named_best(at: Search) -> tuple[Search, Rivals]:
     at, rivals = with_best_names(at)
     kept = _predicting(at)
-    at, rivals = (at, rivals) if kept is at else with_best_names(kept)
-    return (at.at(Bench(at.state.renewed())) if at.state.accepted else at), rivals
+    return (at, rivals) if kept is at else with_best_names(kept)
 
 
 def _predicting(at: Search) -> Search:

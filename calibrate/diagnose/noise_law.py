@@ -54,7 +54,10 @@ class Wander:
         shocks = rng.standard_normal(shape)
         shocks[1:] *= np.sqrt(1.0 - self.rho**2)
         slow = np.asarray(lfilter([1.0], [1.0, -self.rho], shocks, axis=0))
-        return np.sqrt(1.0 - self.share) * white + np.sqrt(self.share) * slow
+        white *= np.sqrt(1.0 - self.share)  # in place: draws are large
+        slow *= np.sqrt(self.share)
+        white += slow
+        return white
 
 
 @dataclass(frozen=True)
@@ -114,7 +117,9 @@ class NoiseLaw:
         _, groups = np.unique(self.rows.sample, return_inverse=True)
         alone = np.where(self.rows.data, groups, groups.max(initial=0) + 1 + np.arange(len(groups)))
         signs = rng.integers(0, 2, (int(alone.max(initial=0)) + 1, count)) * 2.0 - 1.0
-        out = self.inflated[:, None] * signs[alone] * self._stretched(rng, count)
+        out = signs[alone]
+        out *= self.inflated[:, None]
+        out *= self._stretched(rng, count)
         for s in self.series:
             if s.wander.share > 0.0:
                 n, k = s.rows.shape

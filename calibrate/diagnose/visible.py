@@ -156,7 +156,7 @@ def _block(chosen: Ints, columns: list[Floats], sight: Sight) -> Block:
     for at, i in enumerate(chosen):
         raw[at] = columns[i].T
         columns[i] = np.zeros((0, 0))
-    size = np.linalg.norm(raw, axis=2)
+    size = np.sqrt(np.einsum("ekr,ekr->ek", raw, raw))  # without a copy of them all
     raw /= np.where(size > 0.0, size, 1.0)[:, :, None]
     flat = raw.reshape(-1, raw.shape[2])
     absorbed = (flat @ sight.basis).reshape(*raw.shape[:2], -1)

@@ -118,6 +118,9 @@ class LinearSession:
     def trusting(self) -> "LinearSession":
         return replace(self, weights=np.ones(len(self.active)))
 
+    def renewed(self) -> "LinearSession":
+        return self  # its drivers follow nothing that is fitted
+
     def _design(self, accepted) -> Floats:
         parts = [self.geometry]
         for a in accepted:
