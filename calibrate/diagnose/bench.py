@@ -134,5 +134,5 @@ class Bench:
 
 @lru_cache(maxsize=RECENT)
 def recent_menu(bench: Bench, open_: bool) -> Menu:
-    """Of closed terms or open families at a state; made anew where a search comes back to an older one."""
+    """Of closed terms or open families at a state; made again where a search comes back to an older one."""
     return bench.menu_of(tuple(term for term in bench.candidates if term.open is open_))

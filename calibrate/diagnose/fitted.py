@@ -17,10 +17,10 @@ from calibrate.diagnose.augmented import Around, Augmented, plain_sizes
 from calibrate.diagnose.driver_values import as_before, drivers_of
 from calibrate.diagnose.in_sight import in_sight, solve_in_sight
 from calibrate.diagnose.linearised import Accepted, Rows, Unseen
-from calibrate.diagnose.listed import Listed
 from calibrate.diagnose.noise_of_fit import Noise, covariance_at, noise_of, whiteners_of
 from calibrate.diagnose.scatter import Scatter, likelihood_of
 from calibrate.diagnose.session import Session
+from calibrate.effects.catalogue import Listed
 from calibrate.effects.drivers import Drivers
 from calibrate.effects.form import Form
 from calibrate.effects.ports import Port

@@ -48,10 +48,10 @@ class Wander:
 
     def draw(self, shape: tuple[int, ...], rng: Generator) -> Floats:
         """Stationary noise of unit variance, along the first axis."""
-        white = rng.standard_normal(shape)
+        white: Floats = rng.standard_normal(shape)
         if self.share == 0.0:
             return white
-        shocks = rng.standard_normal(shape)
+        shocks: Floats = rng.standard_normal(shape)
         shocks[1:] *= np.sqrt(1.0 - self.rho**2)
         slow = np.asarray(lfilter([1.0], [1.0, -self.rho], shocks, axis=0))
         white *= np.sqrt(1.0 - self.share)  # in place: draws are large
@@ -116,7 +116,7 @@ class NoiseLaw:
         """
         _, groups = np.unique(self.rows.sample, return_inverse=True)
         alone = np.where(self.rows.data, groups, groups.max(initial=0) + 1 + np.arange(len(groups)))
-        signs = rng.integers(0, 2, (int(alone.max(initial=0)) + 1, count)) * 2.0 - 1.0
+        signs = rng.integers(0, 2, (int(alone.max(initial=0)) + 1, count)).astype(np.float64) * 2.0 - 1.0
         out = signs[alone]
         out *= self.inflated[:, None]
         out *= self._stretched(rng, count)

@@ -61,7 +61,7 @@ def balanced(bench: Bench) -> dict[str, list[int]]:
 
 
 def balances(new: Bench, old: Bench) -> bool:
-    """Whether terms of a port all but cancel each other that did not before: what prunes would take the new one away."""
+    """Whether terms of a port all but cancel each other that did not before: pruning would take one away again."""
     return not balanced(new).keys() <= balanced(old).keys()
 
 

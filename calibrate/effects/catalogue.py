@@ -1,5 +1,11 @@
 """All effects, one line each, and those of installed packages; tests/calibrate/effects checks every one by law."""
 
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
 from calibrate import plug_ins
 from calibrate.effects import (
     arm_thermal_growth,
@@ -41,10 +47,13 @@ from calibrate.effects import (
     tool_sag,
 )
 from calibrate.effects.drivers import Drivers
+from calibrate.effects.form import Form, Functions
 from calibrate.effects.kind import Kind
 from calibrate.effects.second_encoders import at_second_encoders
 from calibrate.effects.term import Effect, Holds, Missing, Term
 from calibrate.plug_ins import loaded
+
+Floats = NDArray[np.float64]
 
 EFFECTS: tuple[Effect, ...] = (
     encoder_eccentricity.EFFECT,
@@ -92,6 +101,28 @@ def terms_of(drivers: Drivers) -> tuple[Term, ...]:
     """Every place and form that the catalogue knows and this session allows."""
     listed = tuple(term for effect in EFFECTS for term in effect.terms(drivers))
     return (*listed, *at_second_encoders(listed, drivers))
+
+
+@dataclass(frozen=True, eq=False)
+class Listed:
+    """The catalogue at one set of drivers: states of a search share it as long as their drivers are the same."""
+
+    drivers: Drivers
+    values: dict[tuple[Functions, bytes], Floats] = field(default_factory=dict[tuple[Functions, bytes], Floats])
+
+    @cached_property
+    def terms(self) -> tuple[Term, ...]:
+        """All that the session allows."""
+        return terms_of(self.drivers)
+
+    def function(self, term: Form, inner: Floats) -> Floats:
+        """(sample, m) along each direction of a term; kept where a menu asks for it and it is dear."""
+        if term.open or not all(value in spec.grid for value, spec in zip(inner, term.inner, strict=False)):
+            return term.function(self.drivers, inner)
+        key = (term.function, inner.tobytes())
+        if key not in self.values:
+            self.values[key] = term.function(self.drivers, inner)
+        return self.values[key]
 
 
 def missing_of(drivers: Drivers) -> tuple[Missing, ...]:

@@ -98,3 +98,19 @@ def test_derivatives_of_few_samples_are_those_rows_of_all(geometry):
     (whole,), (own,) = (one.problem.forgetting()._slopes(state.values) for one in (state, cut))
     assert len(own) == len(few) < len(whole)
     assert own == pytest.approx(whole[cut.problem.rows[0]], abs=1e-12 * np.max(np.abs(whole)))
+
+
+def test_drivers_are_those_of_the_fit_itself_once_it_is_renewed(geometry):
+    """On the way a refit may go on from drivers that are hardly others; sizes and the model file may not."""
+    last = with_terms(geometry, *BENT).renewed()
+    used, now = last.problem.drivers, last.predicted
+    assert np.abs(used.frames - now.frames).max() < 1e-5  # rad, m: 1e-5 of a gravity torque
+    assert all(np.nanmax(np.abs(used.readouts[k].predicted - now.readouts[k].predicted)) < 1e-6 for k in now.readouts)
+
+
+def test_states_with_the_same_drivers_list_the_catalogue_once(geometry):
+    one = with_terms(geometry, BENT[1])
+    other = one.refitted(one.accepted)
+    assert other.drivers is one.drivers
+    assert other.listed is one.listed
+    assert one.renewed().listed is not one.listed

@@ -2,10 +2,11 @@
 
 import numpy as np
 
+from calibrate.diagnose import pruning
 from calibrate.diagnose.bench import Bench
 from calibrate.diagnose.line_search import refined
-from calibrate.diagnose.pruning import surrogates, tidied
-from calibrate.diagnose.searching import Search
+from calibrate.diagnose.pruning import balances, confirmed, surrogates, tidied
+from calibrate.diagnose.searching import Search, null_at
 from calibrate.effects.ports import Place, Port
 from calibrate.effects.term import Shape
 
@@ -39,3 +40,25 @@ def test_two_terms_of_one_port_that_both_act_stay(world):
     bench = two_columns(world, rng, apart=1.5, amount=2.0)
     assert surrogates(bench) == []
     assert len(tidied(Search(bench, rng)).state.accepted) == 2
+
+
+def test_an_exchange_that_balances_a_port_is_seen(world):
+    """Pruning would take one of the two away again, round after round."""
+    rng = np.random.default_rng(0)
+    both = two_columns(world, rng, apart=0.05, amount=20.0)
+    one = Bench(both.state.refitted(both.state.accepted[:1]))
+    assert balances(both, one)
+    assert not balances(one, both)
+    assert not balances(both, both)
+
+
+def test_what_goes_is_not_taken_for_noise_that_the_others_are_judged_by(world, monkeypatch):
+    rng = np.random.default_rng(3)
+    wave = world.session(rng, [(world.at_joint(2, lambda d: np.sin(d.q_rad[:, 1])), 2.0)])
+    names = {"encoder-eccentricity": "joint2.angle", "joint-coupling": "joint4.angle", "backlash": "joint1.angle"}
+    terms = [next(t for t in wave.candidates() if (t.physics, t.port.where) == item) for item in names.items()]
+    at = Search(Bench(wave.refitted([refined(Bench(wave), t, np.zeros(0)) for t in terms])), rng)
+    drawn = []
+    monkeypatch.setattr(pruning, "null_at", lambda *given: drawn.append(given) or null_at(*given))
+    assert [a.term.physics for a in confirmed(at).state.accepted] == ["encoder-eccentricity"]
+    assert len(drawn) == 1
