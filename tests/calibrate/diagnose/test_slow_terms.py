@@ -62,17 +62,17 @@ def test_scattered_wild_rows_are_no_step(world):
 
 
 @pytest.mark.parametrize(
-    ("family", "hidden", "physics", "variant"),
+    ("family", "seed", "hidden", "physics", "variant"),
     [
-        ("cones", "briefly-shifted-base", "base-moved", FOR_A_WHILE),
-        ("cones", "bumped-base", "base-moved", ""),
-        ("dual-psd", "briefly-shifted-laser", "laser-moved", FOR_A_WHILE),
-        ("tracker", "lagging-link", "link-thermal-growth", BEHIND),
-        ("tracker", "heated-link", "link-thermal-growth", ""),
+        ("cones", 5, "briefly-shifted-base", "base-moved", FOR_A_WHILE),
+        ("cones", 5, "bumped-base", "base-moved", ""),
+        ("dual-psd", 5, "briefly-shifted-laser", "laser-moved", FOR_A_WHILE),
+        ("tracker", 1, "lagging-link", "link-thermal-growth", BEHIND),
+        ("tracker", 1, "heated-link", "link-thermal-growth", ""),
     ],
 )
-def test_what_came_back_or_came_late_is_told_from_what_did_not(tmp_path, family, hidden, physics, variant):
-    recording = recording_of(tmp_path, family=family, seed=1, samples=120, defects=(hidden,), enr=3.0)
+def test_what_came_back_or_came_late_is_told_from_what_did_not(tmp_path, family, seed, hidden, physics, variant):
+    recording = recording_of(tmp_path, family=family, seed=seed, samples=120, defects=(hidden,), enr=3.0)
     state = fit_geometry(session_of(recording.rig, recording.samples))
     [found] = search(state, np.random.default_rng(1)).state.accepted
     assert (found.term.physics, found.term.variant) == (physics, variant)
