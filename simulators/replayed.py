@@ -17,7 +17,7 @@ from scipy.spatial.transform import Rotation
 from simulators.arm.kinematics import Arm
 from simulators.arm.rigid import inverse
 from simulators.arm.statics import weigh
-from simulators.conceal.observe import readings_at
+from simulators.conceal.observe import on_their_plate, readings_at
 from simulators.conceal.readings import Stance, length_m, position_m, spots, stand, tip_m, true_shaft_rad
 from simulators.conceal.rig import Device, DualPsd, TrueRig
 from simulators.defects import Defect, Scene
@@ -102,6 +102,7 @@ def replayed(rig: Rigged, scene: Scene, mechanisms: Sequence[Sited], reading_rad
 def _seated(rig: Rigged, seat_m: Floats, scene: Scene, defects: Sequence[Defect], reading_rad: Floats) -> Floats:
     """Rows that are in no cone stay as they are."""
     own = TrueRig(rig.arm, rig.tool_point_m, Device(np.eye(4)))
+    seat_m = on_their_plate(seat_m, scene, defects)
     free = ~np.isfinite(seat_m).all(axis=1, keepdims=True)
     anywhere = np.where(free, tip_m(own, stand(own, scene, defects, reading_rad)), seat_m)
     posture_rad = true_shaft_rad(defects, scene, reading_rad)

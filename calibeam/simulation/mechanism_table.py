@@ -14,10 +14,12 @@ import numpy as np
 
 from calibeam.simulation import of_arm, of_instruments
 from calibeam.simulation.found import FoundEffect
+from calibrate.effects.fixture_moved import ONE_BODY
 from calibrate.effects.ports import Place
 from calibrate.effects.psd_cover_glass import INDEX
 from calibrate.effects.second_encoders import AGAINST, PAST, SECOND
 from calibrate.effects.term import Shape
+from calibrate.effects.time_laws import BEHIND, FOR_A_WHILE
 from calibrate.sensors.catalogue import kind_of
 from calibrate.sensors.kind import Trait
 from simulators.defects import Defect, base, detector, drive, encoder, fixture, found_curve, link, tool, tracker
@@ -292,6 +294,14 @@ TABLE: tuple[Line, ...] = (
     ),
     Line(
         "link-thermal-growth",
+        "one link, behind its thermometer",
+        _named(BEHIND),
+        link.LaggingLink,
+        "expansion, 1/K, thermometer, and time constant of the link behind it, s",
+        of_arm.make_lagging,
+    ),
+    Line(
+        "link-thermal-growth",
         "one link, by temperature",
         lambda f: bool(f.thermometer),
         link.HeatedLink,
@@ -437,7 +447,15 @@ TABLE: tuple[Line, ...] = (
     ),
     Line(
         "fixture-moved",
-        "all of it",
+        "all stations",
+        _named(ONE_BODY),
+        fixture.CarriedTable,
+        "shift, m, and turn, rad, of the table under all stations, and its moment, s",
+        of_arm.make_fixture,
+    ),
+    Line(
+        "fixture-moved",
+        "one station",
         _any,
         fixture.CarriedFixture,
         "shift, m, and turn, rad, of the fixture in its own frame, moment or duration",
@@ -500,7 +518,15 @@ TABLE: tuple[Line, ...] = (
         lambda f: detector.CoverGlass(f.number, f.size("thickness_m"), INDEX),
     ),
     Line(
-        "seat-moved", "all of it", _any, fixture.MovedCone, "shift of the cone, m, and its moment, s", of_arm.make_cone
+        "seat-moved",
+        "all on one plate, or one for a while",
+        lambda f: f.variant.startswith(ONE_BODY) or f.variant.endswith(FOR_A_WHILE),
+        fixture.CarriedCones,
+        "shift, m, and turn, rad, of the plate or the cone, moment and duration, s",
+        of_arm.make_cones,
+    ),
+    Line(
+        "seat-moved", "one cone", _any, fixture.MovedCone, "shift of the cone, m, and its moment, s", of_arm.make_cone
     ),
     Line(
         "device-scale",

@@ -7,9 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibeam.simulation.found import FoundEffect
-from calibrate.effects.fixture_moved import CARRIED
+from calibrate.effects.fixture_moved import CARRIED, ONE_BODY
 from calibrate.effects.hand_force import FORCE_N
 from calibrate.effects.term import Shape
+from calibrate.effects.time_laws import FOR_A_WHILE
 from simulators.arm.rigid import Vector
 from simulators.arm.statics import Load, Weight, carried_by, loaded_by
 from simulators.defects import Defect
@@ -24,8 +25,8 @@ from simulators.defects.drive import (
     TwoSlopeFlexspline,
 )
 from simulators.defects.encoder import RADIUS_M, EccentricDisc, EncoderSlip, OvalRing
-from simulators.defects.fixture import CarriedFixture, MovedCone
-from simulators.defects.link import FlatLink, HeatedLink, WarmingUp, WornBearing, cantilever
+from simulators.defects.fixture import CarriedCones, CarriedFixture, CarriedTable, MovedCone
+from simulators.defects.link import FlatLink, HeatedLink, LaggingLink, WarmingUp, WornBearing, cantilever
 from simulators.defects.tracker import CarriedDevice
 
 Floats = NDArray[np.float64]
@@ -121,6 +122,10 @@ def make_heated(f: FoundEffect) -> Defect:
     return HeatedLink(f.number, f.size("expansion_per_k"), f.thermometer)
 
 
+def make_lagging(f: FoundEffect) -> Defect:
+    return LaggingLink(f.number, f.size("expansion_per_k"), f.thermometer, f.size("lag_s"))
+
+
 def make_warming(f: FoundEffect, first: int, last: int) -> Defect:
     return WarmingUp(first, last, f.size("growth_share"), f.size("time_constant_s"))
 
@@ -129,6 +134,8 @@ def course_of(f: FoundEffect) -> tuple[Course, float, float]:
     """Course, moment and duration on the session's clock."""
     if f.thermometer:
         return "warmth", 0.0, 1.0
+    if f.term.shape is Shape.STEP and "until_s" in f.sizes:
+        return "while", f.size("time_s") - f.session.start_s, f.size("until_s") - f.size("time_s")
     if f.term.shape is Shape.STEP:
         return "step", f.size("time_s") - f.session.start_s, 1.0
     if f.term.shape is Shape.EXPONENTIAL:
@@ -152,6 +159,8 @@ def make_device(f: FoundEffect) -> Defect:
 
 
 def make_fixture(f: FoundEffect) -> Defect:
+    if f.variant == ONE_BODY:
+        return carried(f, np.eye(4), 1.0, CarriedTable)
     place = int(f.variant.removeprefix("place ").removesuffix(CARRIED))
     until_s = taken_away_s(f, place) if f.variant.endswith(CARRIED) else np.inf
     return carried(f, f.session.light.places[place - 1], 1.0, CarriedFixture, place=place, until_s=until_s)
@@ -164,6 +173,12 @@ def taken_away_s(f: FoundEffect, place: int) -> float:
         return np.inf
     after = t_s[spots.seen & (spots.place != place) & (t_s >= f.size("time_s"))]
     return float(after.min(initial=np.inf)) - f.session.start_s
+
+
+def make_cones(f: FoundEffect) -> Defect:
+    """All on one plate; or one that came back, whose place within the plate stays."""
+    seat = f.variant.removeprefix("seat ").removesuffix(FOR_A_WHILE).removesuffix(", ")
+    return carried(f, np.eye(4), 1.0, CarriedCones, cone=int(seat) if seat.isdigit() else 0)
 
 
 def make_cone(f: FoundEffect) -> Defect:

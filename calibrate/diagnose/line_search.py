@@ -25,9 +25,12 @@ def refined(bench: Bench, term: Term, inner: Floats, without: Removed | None = N
     """The term with inner values that explain most, and the coefficients that belong to them."""
     best = inner.copy()
     for _ in range(SWEEPS if len(term.inner) > 1 else min(len(term.inner), 1)):
+        before = best.copy()
         for j, spec in enumerate(term.inner):
             times = telling_times(bench, term, best) if spec.discrete else np.zeros(0)
             best[j] = _best_of_one(_explains(bench, term, best, j, without), spec, best[j], times)
+        if np.array_equal(best, before):
+            break
     return Accepted(term, solved(bench, term, best, without)[0], best)
 
 
@@ -58,7 +61,8 @@ def _explains(bench: Bench, term: Term, inner: Floats, j: int, without: Removed 
 
 def telling_times(bench: Bench, term: Term, inner: Floats) -> Floats:
     """(time,) of the samples that can show when a step was: those that would feel it, had it always been there."""
-    always = np.where([spec.discrete for spec in term.inner], -np.inf, inner)
+    ends = np.where([spec.later for spec in term.inner], np.inf, -np.inf)
+    always = np.where([spec.discrete for spec in term.inner], ends, inner)
     felt = np.any(term.basis(bench.state.drivers, always) != 0.0, axis=(1, 2))
     return np.unique(bench.state.drivers.t_s[felt])
 

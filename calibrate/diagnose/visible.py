@@ -145,9 +145,14 @@ def beyond(menu: Menu, span: Floats) -> Menu:
 
 
 def grid_of(term: Term) -> list[Floats]:
-    """All combinations of the coarse values of a term's inner parameters."""
+    """All combinations of the coarse values of a term's inner parameters, an end after its begin."""
     meshed = np.meshgrid(*(np.array(inner.grid) for inner in term.inner), indexing="ij")
-    return list(np.stack([m.ravel() for m in meshed], axis=1)) if meshed else [np.zeros(0)]
+    if not meshed:
+        return [np.zeros(0)]
+    values = np.stack([m.ravel() for m in meshed], axis=1)
+    for j, spec in enumerate(term.inner):
+        values = values[values[:, j] > values[:, j - 1]] if spec.later else values
+    return list(values)
 
 
 def _block(chosen: Ints, columns: list[Floats], sight: Sight) -> Block:

@@ -1,17 +1,14 @@
 """The base, or the table under everything, drifts or is bumped."""
 
-from calibrate.effects import time_laws
 from calibrate.effects.drivers import Drivers
 from calibrate.effects.kind import Kind
-from calibrate.effects.moved import drifts, motion
-from calibrate.effects.term import Holds, Shape, Term
+from calibrate.effects.moved import bumped, drifts
+from calibrate.effects.term import Holds, Term
 
 
 def _terms(drivers: Drivers) -> tuple[Term, ...]:
-    out = drifts(drivers, "base.pose", "base-moved", "The base")
-    if inner := time_laws.step_inner(drivers):
-        out.append(motion("base.pose", "base-moved", "t", Shape.STEP, time_laws.step, "The base", inner))
-    return tuple(out)
+    base = ("base.pose", "base-moved", "The base")
+    return (*drifts(drivers, *base), *bumped(drivers, *base))
 
 
 EFFECT = Kind(

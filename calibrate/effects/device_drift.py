@@ -1,22 +1,17 @@
 """The measuring device drifts or is bumped: its frame is no longer where it was."""
 
-from calibrate.effects import time_laws
 from calibrate.effects.drivers import Drivers
 from calibrate.effects.kind import Kind
-from calibrate.effects.moved import drifts, motion
-from calibrate.effects.term import Holds, Shape, Term
+from calibrate.effects.moved import bumped, drifts
+from calibrate.effects.term import Holds, Term
 from calibrate.sensors.kind import Trait
 
 
 def _terms(drivers: Drivers) -> tuple[Term, ...]:
     if not drivers.having(Trait.DEVICE):
         return ()
-    out = drifts(drivers, "device.pose", "device-drift", "The measuring device")
-    if inner := time_laws.step_inner(drivers):
-        out.append(
-            motion("device.pose", "device-drift", "t", Shape.STEP, time_laws.step, "The measuring device", inner)
-        )
-    return tuple(out)
+    device = ("device.pose", "device-drift", "The measuring device")
+    return (*drifts(drivers, *device), *bumped(drivers, *device))
 
 
 EFFECT = Kind(

@@ -1,4 +1,4 @@
-"""The laser was seated again, or slipped in its mount: from some moment on its beam is another line of the flange."""
+"""The laser was seated again, slipped in its mount, or was pulled aside for a while: its beam is another line then."""
 
 from calibrate.effects import time_laws
 from calibrate.effects.drivers import Drivers
@@ -6,31 +6,39 @@ from calibrate.effects.form import Form
 from calibrate.effects.kind import Kind
 from calibrate.effects.ports import Place, Port
 from calibrate.effects.since_model import LASER, line_of
-from calibrate.effects.term import Holds, Shape, Term
+from calibrate.effects.term import Holds, Inner, Shape, Term
 
 LIMIT = 1e-2  # m, rad: farther, and no session goes on
 
 
 def _terms(drivers: Drivers) -> tuple[Term, ...]:
-    inner = time_laws.step_inner(drivers)
-    if drivers.light is None or drivers.rig.tool.laser_direction is None or not inner:
+    if drivers.light is None or drivers.rig.tool.laser_direction is None:
         return ()
-    return (
-        Form(
-            Port("laser.direction", Place.FRAME, drivers.n_joints),
-            ("t",),
-            Shape.STEP,
-            "laser-moved",
-            None,
-            inner,
-            slow=True,
-            function=time_laws.step,
-            directions=line_of(drivers),
-            names=LASER,
-            limit=LIMIT,
-            sentence="The laser moved by {shift_u_m}, {shift_v_m} and turned by {tilt_u_rad}, {tilt_v_rad} across its "
-            "beam from {time_s} on: seated again, or slipped in its mount",
-        ),
+    out: list[Term] = []
+    if inner := time_laws.step_inner(drivers):
+        out.append(_moved(drivers, time_laws.step, inner, "", ": seated again, or slipped in its mount"))
+    if inner := time_laws.while_inner(drivers):
+        pulled = ": pulled aside, by its cable or a hand"
+        out.append(_moved(drivers, time_laws.for_a_while(), inner, time_laws.FOR_A_WHILE, pulled))
+    return tuple(out)
+
+
+def _moved(drivers: Drivers, law: time_laws.Law, inner: tuple[Inner, ...], variant: str, ending: str) -> Term:
+    return Form(
+        Port("laser.direction", Place.FRAME, drivers.n_joints),
+        ("t",),
+        Shape.STEP,
+        "laser-moved",
+        None,
+        inner,
+        slow=True,
+        variant=variant,
+        function=law,
+        directions=line_of(drivers),
+        names=LASER,
+        limit=LIMIT,
+        sentence="The laser moved by {shift_u_m}, {shift_v_m} and turned by {tilt_u_rad}, {tilt_v_rad} across its "
+        "beam" + time_laws.when(inner) + ending,
     )
 
 

@@ -1,4 +1,4 @@
-"""A link, or the whole arm, grows with its temperature."""
+"""A link grows with its temperature, or behind it: a casting takes its time to follow the thermometer on its skin."""
 
 import numpy as np
 
@@ -9,7 +9,7 @@ from calibrate.effects.kind import Kind
 from calibrate.effects.link_span import SHORTEST_M, link_vectors
 from calibrate.effects.ports import Place, Port
 from calibrate.effects.term import Inner, Missing, Shape, Term
-from calibrate.effects.time_laws import varies
+from calibrate.effects.time_laws import BEHIND, varies
 
 LIMIT_PER_K = 1e-4  # aluminium 24e-6; a thermometer far from the link sees less than the link does
 LIMIT_GROWTH = 3e-3  # relative, where time stands for temperature
@@ -22,7 +22,7 @@ def _terms(drivers: Drivers) -> tuple[Term, ...]:
             continue
         for where, T in drivers.temperatures_degC.items():
             if varies(T):
-                out.append(_with_temperature(link, where))
+                out += [_with_temperature(link, where), _behind(drivers, link, where)]
         out.append(_over_time(drivers, link))
     return tuple(out)
 
@@ -34,13 +34,30 @@ def _with_temperature(link: int, where: str) -> Term:
     return _term(link, f"temp_{where}", Shape.LINEAR, law, (), "expansion_per_k", LIMIT_PER_K)
 
 
+def _behind(drivers: Drivers, link: int, where: str) -> Term:
+    """True of its session only: how warm the casting is depends on what its thermometer has read before."""
+
+    def law(drivers: Drivers, inner: Floats) -> Floats:
+        return time_laws.behind_thermometer(where, drivers, inner)
+
+    inner = time_laws.lag_inner(drivers)
+    return _term(link, f"temp_{where}", Shape.LINEAR, law, inner, "expansion_per_k", LIMIT_PER_K, BEHIND)
+
+
 def _over_time(drivers: Drivers, link: int) -> Term:
     inner = time_laws.constant_inner(drivers)
     return _term(link, "t", Shape.EXPONENTIAL, time_laws.towards, inner, "growth_share", LIMIT_GROWTH)
 
 
 def _term(
-    link: int, driver: str, shape: Shape, law: time_laws.Law, inner: tuple[Inner, ...], name: str, limit: float
+    link: int,
+    driver: str,
+    shape: Shape,
+    law: time_laws.Law,
+    inner: tuple[Inner, ...],
+    name: str,
+    limit: float,
+    variant: str = "",
 ) -> Term:
     def function(drivers: Drivers, values: Floats) -> Floats:
         out = np.zeros((len(drivers.t_s), 6, 1))
@@ -54,7 +71,8 @@ def _term(
         "link-thermal-growth",
         None,
         inner,
-        slow=driver == "t",
+        slow=driver == "t" or variant == BEHIND,
+        variant=variant,
         function=function,
         names=(name,),
         limit=limit,

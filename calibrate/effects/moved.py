@@ -8,7 +8,7 @@ from calibrate.effects.drivers import Drivers
 from calibrate.effects.form import Floats, Form
 from calibrate.effects.ports import Place, Port
 from calibrate.effects.term import Inner, Shape, Term
-from calibrate.effects.time_laws import Law, varies
+from calibrate.effects.time_laws import FOR_A_WHILE, Law, varies
 
 SIX = ("shift_x_m", "shift_y_m", "shift_z_m", "turn_x_rad", "turn_y_rad", "turn_z_rad")
 LIMIT = 2e-2  # m, rad: farther, and it was put somewhere else
@@ -23,6 +23,26 @@ def drifts(drivers: Drivers, where: str, physics: str, what: str) -> list[Term]:
     for place, T in drivers.temperatures_degC.items():
         if varies(T):
             out.append(motion(where, physics, f"temp_{place}", Shape.LINEAR, _warmed(place), what))
+    return out
+
+
+def bumped(
+    drivers: Drivers,
+    where: str,
+    physics: str,
+    what: str,
+    among: NDArray[np.bool_] | None = None,
+    width: int = 6,
+    variant: str = "",
+) -> list[Term]:
+    """A pose that is another one from some moment on, or for a while; `among` (pose,) are samples that can show it."""
+    there = None if among is None else in_use(among)
+    out: list[Term] = []
+    if inner := time_laws.step_inner(drivers, among):
+        out.append(motion(where, physics, "t", Shape.STEP, time_laws.step, what, inner, there, width, variant))
+    if inner := time_laws.while_inner(drivers, among):
+        law, brief = time_laws.for_a_while(among), f"{variant}, {FOR_A_WHILE}".removeprefix(", ")
+        out.append(motion(where, physics, "t", Shape.STEP, law, what, inner, there, width, brief))
     return out
 
 

@@ -1,13 +1,15 @@
-"""A cone slid: from some moment on its centre is elsewhere."""
+"""A cone slid, or the plate with all of them was knocked: from some moment on they are elsewhere, or for a while."""
 
 import numpy as np
 
-from calibrate.effects import time_laws
 from calibrate.effects.drivers import Drivers
+from calibrate.effects.fixture_moved import ONE_BODY
 from calibrate.effects.kind import Kind
-from calibrate.effects.moved import in_use, motion
-from calibrate.effects.term import Holds, Shape, Term
+from calibrate.effects.moved import bumped
+from calibrate.effects.term import Holds, Term
 from calibrate.sensors.kind import Trait
+
+SEAT = ("seat.position", "seat-moved")
 
 
 def _terms(drivers: Drivers) -> tuple[Term, ...]:
@@ -15,26 +17,13 @@ def _terms(drivers: Drivers) -> tuple[Term, ...]:
     if seats is None or seats.place is None:
         return ()
     out: list[Term] = []
-    for seat in np.unique(seats.place[seats.seen]).tolist():
+    numbers = np.unique(seats.place[seats.seen]).tolist()
+    if len(numbers) > 1:
+        plate = (*SEAT, "The plate with all cones", seats.seen)
+        out += bumped(drivers, *plate, variant=ONE_BODY)
+    for seat in numbers:
         in_seat = seats.seen & (seats.place == seat)
-
-        there = in_use(in_seat)
-
-        if inner := time_laws.step_inner(drivers, in_seat):
-            out.append(
-                motion(
-                    "seat.position",
-                    "seat-moved",
-                    "t",
-                    Shape.STEP,
-                    time_laws.step,
-                    f"Seat {seat}",
-                    inner,
-                    there,
-                    3,
-                    f"seat {seat}",
-                )
-            )
+        out += bumped(drivers, *SEAT, f"Seat {seat}", in_seat, 3, f"seat {seat}")
     return tuple(out)
 
 

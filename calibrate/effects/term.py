@@ -47,6 +47,7 @@ class Inner:
     lower: float
     upper: float
     discrete: bool = False  # only a search finds it (a step's time): the refit leaves it alone
+    later: bool = False  # than the one before it: an end, which follows its begin
 
 
 @dataclass(frozen=True)

@@ -31,6 +31,7 @@ from calibrate.effects.fixture_moved import CARRIED
 from calibrate.effects.ports import Perturbation, Place
 from calibrate.effects.second_encoders import SECOND
 from calibrate.effects.term import Shape, Size
+from calibrate.effects.time_laws import FOR_A_WHILE
 from calibrate.errors import DataError
 from calibrate.fit import Status, Stop
 from calibrate.fit_plan import LossName, SolverName
@@ -252,7 +253,7 @@ def _effects(
         mine, finding = np.flatnonzero(fit.problem.owner == i), _finding_of(a, findings)
         sizes = sizes_of(bench, i) if finding is None and not a.term.open else None
         out.append(_effect(a, name, finding, fit.drivers, covariance[np.ix_(mine, mine)], sizes))
-    lasting = (e for e in out if e.shape == Shape.STEP.value and not e.variant.endswith(CARRIED))
+    lasting = (e for e in out if e.shape == Shape.STEP.value and not e.variant.endswith((CARRIED, FOR_A_WHILE)))
     return (*out, *map(_aftermath, lasting))
 
 

@@ -45,12 +45,17 @@ def seated_readings(
 ) -> Floats:
     """Encoder readings (row, n) with the probe truly in its cone, in the posture nearest to `posture_rad` (row, n)."""
     seat_m, cone = artefacts.seat_m[scene.seat - 1], (scene.seat <= artefacts.cones)[:, np.newaxis]
+    seat_m = np.where(cone, on_their_plate(seat_m, scene, defects), seat_m)  # bars are held by hand
+    return readings_at(rig, seat_m, scene, defects, posture_rad)
+
+
+def on_their_plate(seat_m: Floats, scene: Scene, defects: Sequence[Defect]) -> Floats:
+    """(row, 3) cones where what carries them all has taken them."""
     for defect in defects:
         if isinstance(defect, MovesStations):
             motion = defect.stations_motion(scene)
-            moved_m = np.einsum("rij,rj->ri", motion[:, :3, :3], seat_m) + motion[:, :3, 3]
-            seat_m = np.where(cone, moved_m, seat_m)  # bars are held by hand
-    return readings_at(rig, seat_m, scene, defects, posture_rad)
+            seat_m = np.einsum("rij,rj->ri", motion[:, :3, :3], seat_m) + motion[:, :3, 3]
+    return seat_m
 
 
 def readings_at(rig: TrueRig, wanted_m: Floats, scene: Scene, defects: Sequence[Defect], posture_rad: Floats) -> Floats:

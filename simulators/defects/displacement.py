@@ -92,16 +92,16 @@ class Settling(Displacement):
         return self.shift_m * (1.0 - np.exp(-scene.t_s / self.time_constant_s))
 
 
-Course = Literal["step", "settling", "steady", "warmth"]
+Course = Literal["step", "while", "settling", "steady", "warmth"]
 
 
 @dataclass(frozen=True)
 class CarriedPart(Defect):
     """A part that is carried away: by `shift_m`, and turned by `turn_rad` about `about_m`, in its own frame.
 
-    `course` states when: all of it from `at_s` on ("step"); slowly to that end with the time constant `over_s`, from
-    `at_s` on ("settling"); by that much in every `over_s`, steadily ("steady"); by that much for each kelvin at
-    `where` ("warmth").
+    `course` states when: all of it from `at_s` on ("step"), or for `over_s` only ("while"); slowly to that end with
+    the time constant `over_s`, from `at_s` on ("settling"); by that much in every `over_s`, steadily ("steady"); by
+    that much for each kelvin at `where` ("warmth").
     """
 
     shift_m: Vector
@@ -121,12 +121,18 @@ class CarriedPart(Defect):
         turned = turned_about(np.asarray(self.about_m), gone * np.asarray(self.turn_rad))
         return shifted(gone * np.asarray(self.shift_m)) @ turned
 
+    def carried_where(self, here: NDArray[np.bool_], scene: Scene) -> Floats:
+        """The same in the rows `here`; in all others it stays."""
+        return np.where(here[:, np.newaxis, np.newaxis], self.carried(scene), np.eye(4))
+
     def _gone(self, scene: Scene) -> Floats:
         """(row,) how much of the way."""
         since_s = scene.t_s - self.at_s
         match self.course:
             case "step":
                 return (since_s >= 0.0).astype(np.float64)
+            case "while":
+                return ((since_s >= 0.0) & (since_s < self.over_s)).astype(np.float64)
             case "settling":
                 return -np.expm1(-since_s / self.over_s)
             case "steady":

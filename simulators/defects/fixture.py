@@ -98,8 +98,35 @@ class CarriedFixture(CarriedPart):
     INSTRUMENTS = SPOTS
 
     def fixture_motion(self, scene: Scene) -> Floats:
-        here = (scene.placement == self.place) & (scene.t_s < self.until_s)
-        return np.where(here[:, np.newaxis, np.newaxis], self.carried(scene), np.eye(4))
+        return self.carried_where((scene.placement == self.place) & (scene.t_s < self.until_s), scene)
+
+
+@dataclass(frozen=True)
+class CarriedTable(CarriedPart):
+    """The table with all stations of the fixture, in the base frame."""
+
+    KIND = "carried-table"
+    PHYSICS = "fixture-moved"
+    PORT = "fixture*.pose"
+    INSTRUMENTS = SPOTS
+
+    def stations_motion(self, scene: Scene) -> Floats:
+        return self.carried_where(scene.placement > 0, scene)
+
+
+@dataclass(frozen=True)
+class CarriedCones(CarriedPart):
+    """The plate with all cones, or one of them (`cone`; 0: all), in the base frame."""
+
+    cone: int = 0
+
+    KIND = "carried-cones"
+    PHYSICS = "seat-moved"
+    PORT = "seat*.position"
+    INSTRUMENTS = ("seat",)
+
+    def stations_motion(self, scene: Scene) -> Floats:
+        return self.carried_where(scene.seat == self.cone if self.cone else scene.seat > 0, scene)
 
 
 class _AllStations(Bump):

@@ -93,6 +93,8 @@ GIVEN: tuple[type[Defect], ...] = (
     tool.CarriedLaser,
     tool.CarriedTarget,
     fixture.CarriedFixture,
+    fixture.CarriedTable,
+    fixture.CarriedCones,
     detector.StrainedFace,
     detector.UnevenLayer,
     detector.WavesOnFace,

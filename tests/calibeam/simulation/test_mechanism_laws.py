@@ -18,6 +18,7 @@ from calibeam.simulation.scene_of_samples import Clock, scene_of
 from calibrate.diagnose.ported import perturbed_frames
 from calibrate.effects.catalogue import terms_of
 from calibrate.effects.drivers import Readout
+from calibrate.effects.fixture_moved import ONE_BODY
 from calibrate.effects.ports import Perturbation
 from calibrate.effects.second_encoders import PLACES
 from calibrate.effects.term import Shape, Term
@@ -28,26 +29,25 @@ from calibrate.sensors.camera import PLACE, TURN
 from calibrate.sensors.encoder_difference import NAME as ENCODER_DIFFERENCE
 from simulators.conceal.case import conceal
 from simulators.conceal.rig_file import rig_document, toml_text
-from simulators.conceal.wanted import FAMILIES, Family, Wanted
+from simulators.conceal.wanted import FAMILIES, Family
 from simulators.defects import Scene
 from simulators.replayed import Readings, Rigged, Sited, replayed
-from tests.calibrate.effects.conftest import SAMPLES, SEED, full_session
+from tests.calibrate.effects.conftest import full_session, wanted
 
 SIZE = 5e-5  # rad or m at a port: what a machine shows
 
 
-def rig_text_of(family: Family) -> str:
+def rig_text_of(family: Family, *, in_turns: bool = False) -> str:
     """The rig file of that session."""
-    places = 4 if family == "cones" else 3
-    return toml_text(rig_document(conceal(Wanted(family, SEED, samples=SAMPLES, places=places)).belief))
+    return toml_text(rig_document(conceal(wanted(family, in_turns=in_turns)).belief))
 
 
 class Bench:
     """One session of a family, as both sides see it."""
 
-    def __init__(self, family: Family) -> None:
-        fit = full_session(family)
-        self.rig_text = rig_text_of(family)
+    def __init__(self, family: Family, *, in_turns: bool) -> None:
+        fit = full_session(family, in_turns=in_turns)
+        self.rig_text = rig_text_of(family, in_turns=in_turns)
         self.drivers, self.samples = fit.drivers, fit.session.samples
         values = {p.name: float(v) for p, v in zip(fit.session.parameters, fit.geometry, strict=True)}
         names = tuple(m.name for m in fit.session.measured)
@@ -101,8 +101,8 @@ def rms(values: np.ndarray) -> float:
 
 
 @cache
-def bench(family: Family) -> Bench:
-    return Bench(family)
+def bench(family: Family, *, in_turns: bool = False) -> Bench:
+    return Bench(family, in_turns=in_turns)
 
 
 def acts(term: Term, place: Bench) -> bool:
@@ -191,8 +191,16 @@ def test_a_six_d_target_and_a_camera_are_where_the_model_has_them() -> None:
         assert turned.magnitude().max() < 1e-9
 
 
+def test_all_stations_of_a_table_move_as_one_body_where_the_arm_goes_to_and_fro_between_them() -> None:
+    place = bench("dual-psd", in_turns=True)
+    term = next(term for term in acting(place) if term.physics == "fixture-moved" and term.variant == ONE_BODY)
+    off, whole = place.apart(found_of(term, place))
+    assert off < 0.02 * whole
+
+
 def test_every_line_of_the_table_is_met_by_the_catalogue() -> None:
-    met = {id(line_of(found_of(term, place))) for place in map(bench, FAMILIES) for term in acting(place)}
+    benches = (*map(bench, FAMILIES), bench("dual-psd", in_turns=True))
+    met = {id(line_of(found_of(term, place))) for place in benches for term in acting(place)}
     never = [f"{line.physics}: {line.form}" for line in TABLE if id(line) not in met]
     assert never == []
 

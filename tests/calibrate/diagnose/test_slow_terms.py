@@ -6,10 +6,15 @@ import numpy as np
 import pytest
 
 from calibrate.diagnose.bench import Bench
+from calibrate.diagnose.fitted import fit_geometry
 from calibrate.diagnose.line_search import refined
 from calibrate.diagnose.pruning import fading
 from calibrate.diagnose.search import search, unswallowed
 from calibrate.diagnose.searching import Search
+from calibrate.diagnose.session import session_of
+from calibrate.effects.time_laws import BEHIND, FOR_A_WHILE
+
+from .concealed import recording_of
 
 
 def slip(session, joint):
@@ -54,6 +59,23 @@ def test_scattered_wild_rows_are_no_step(world):
         readings = session.readings.copy()
         readings[wild] += 25.0 * rng.choice([-1.0, 1.0], (10, readings.shape[1]))
         assert unswallowed(Search(Bench(world.with_readings(session, readings)), rng)) is None
+
+
+@pytest.mark.parametrize(
+    ("family", "seed", "hidden", "physics", "variant"),
+    [
+        ("cones", 5, "briefly-shifted-base", "base-moved", FOR_A_WHILE),
+        ("cones", 5, "bumped-base", "base-moved", ""),
+        ("dual-psd", 5, "briefly-shifted-laser", "laser-moved", FOR_A_WHILE),
+        ("tracker", 1, "lagging-link", "link-thermal-growth", BEHIND),
+        ("tracker", 1, "heated-link", "link-thermal-growth", ""),
+    ],
+)
+def test_what_came_back_or_came_late_is_told_from_what_did_not(tmp_path, family, seed, hidden, physics, variant):
+    recording = recording_of(tmp_path, family=family, seed=seed, samples=120, defects=(hidden,), enr=3.0)
+    state = fit_geometry(session_of(recording.rig, recording.samples))
+    [found] = search(state, np.random.default_rng(1)).state.accepted
+    assert (found.term.physics, found.term.variant) == (physics, variant)
 
 
 @pytest.mark.parametrize(

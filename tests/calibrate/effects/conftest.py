@@ -20,12 +20,17 @@ SEED, SAMPLES = 5, 120
 JOINTS = 6
 
 
+def wanted(family: Family, *, in_turns: bool = False) -> Wanted:
+    """What such a session is drawn by; `in_turns`: the arm goes to and fro between stations that are one body."""
+    hidden = ("knocked-table",) if in_turns else ()
+    return Wanted(family, SEED, hidden, samples=SAMPLES, places=4 if family == "cones" else 3)
+
+
 @cache
-def full_session(family: Family) -> Fitted:
+def full_session(family: Family, *, in_turns: bool = False) -> Fitted:
     """Geometry fitted to a session in which every column that an effect can ask for is recorded."""
     with tempfile.TemporaryDirectory() as folder:
-        places = 4 if family == "cones" else 3
-        write_case(conceal(Wanted(family, SEED, samples=SAMPLES, places=places)), Path(folder))
+        write_case(conceal(wanted(family, in_turns=in_turns)), Path(folder))
         rec = read(Path(folder) / "recording")
     return fit_geometry(session_of(rec.rig, with_every_driver(rec.samples)))
 

@@ -7,15 +7,22 @@ import pytest
 from msgspec import structs
 
 from calibrate.diagnose.ported import perturbed_frames
+from calibrate.diagnose.visible import grid_of
+from calibrate.effects import time_laws
 from calibrate.effects.arm_thermal_growth import EFFECT as ARM_GROWTH
 from calibrate.effects.backlash import EFFECT as BACKLASH
+from calibrate.effects.base_moved import EFFECT as BASE_MOVED
 from calibrate.effects.curves import bumps, splines
 from calibrate.effects.encoder_eccentricity import EFFECT as ECCENTRICITY
+from calibrate.effects.fixture_moved import ONE_BODY
 from calibrate.effects.gravity import gravity_in_flange, likely_torque_nm, masses
+from calibrate.effects.laser_moved import EFFECT as LASER_MOVED
 from calibrate.effects.link_bending import EFFECT as BENDING
+from calibrate.effects.link_thermal_growth import EFFECT as LINK_GROWTH
 from calibrate.effects.open_at_readouts import EFFECT as READOUTS
 from calibrate.effects.ports import Perturbation
 from calibrate.effects.reading_lag import EFFECT as LAG
+from calibrate.effects.seat_moved import EFFECT as SEAT_MOVED
 from calibrate.effects.term import Shape, Size
 from calibrate.effects.tool_sag import EFFECT as SAG
 
@@ -162,3 +169,64 @@ def test_splines_and_a_constant_span_every_cubic():
 
 def test_a_bump_is_one_at_its_place_and_gone_four_widths_off():
     assert bumps(np.array([0.3, 0.7]), np.array([0.3, 0.1]))[:, 0] == pytest.approx([1.0, np.exp(-8.0)])
+
+
+def brief(effect, drivers, variant=time_laws.FOR_A_WHILE):
+    return next(term for term in effect.terms(drivers) if term.variant == variant)
+
+
+@pytest.mark.parametrize(("effect", "family"), [(BASE_MOVED, "cones"), (LASER_MOVED, "dual-psd")])
+def test_what_is_put_back_is_elsewhere_between_two_times_only(effect, family):
+    drivers = full_session(family).drivers
+    term, t = brief(effect, drivers), np.sort(drivers.t_s)
+    moved = np.any(term.basis(drivers, (t[[39, 79]] + t[[40, 80]]) / 2.0) != 0.0, axis=(1, 2))
+    assert np.array_equal(np.sort(drivers.t_s[moved]), t[40:80])
+    sizes = {name: Size(1e-5, 1e-6) for name in term.names}
+    says = term.says(sizes | {"time_s": Size(30.0, 1.0), "until_s": Size(75.0, 2.0)})
+    assert "from 30.0 ± 1.0 s on, until 75.0 ± 2.0 s" in says
+
+
+def test_three_shots_are_no_state():
+    drivers = full_session("cones").drivers
+    term, t = brief(BASE_MOVED, drivers), np.sort(drivers.t_s)
+    between = (t[:-1] + t[1:]) / 2.0
+    assert not np.any(term.basis(drivers, between[[39, 42]]))
+    assert np.any(term.basis(drivers, between[[39, 43]]))
+
+
+def test_an_end_is_sought_after_its_begin():
+    drivers = full_session("cones").drivers
+    for variant in (time_laws.FOR_A_WHILE, *(f"{what}, {time_laws.FOR_A_WHILE}" for what in (ONE_BODY, "seat 2"))):
+        term = brief(BASE_MOVED if variant == time_laws.FOR_A_WHILE else SEAT_MOVED, drivers, variant)
+        pairs = np.array(grid_of(term))
+        assert np.all(pairs[:, 0] < pairs[:, 1])
+        assert all(np.any(term.basis(drivers, pair)) for pair in pairs)
+
+
+def test_a_plate_with_all_cones_moves_as_what_stands_around_a_base():
+    drivers = full_session("cones").drivers
+    plate = brief(SEAT_MOVED, drivers, ONE_BODY)
+    base = next(t for t in BASE_MOVED.terms(drivers) if t.shape is Shape.STEP and not t.variant)
+    at, seen = np.array([np.median(drivers.t_s)]), drivers.readouts["seat"].seen
+    assert np.array_equal(plate.basis(drivers, at)[seen], base.basis(drivers, at)[seen])
+    assert not np.any(plate.basis(drivers, at)[~seen])
+
+
+def test_a_link_behind_its_thermometer_trails_a_ramp_and_ends_on_it():
+    """A ramp of T is followed at the distance rate x lag (1 - exp(-t / lag)); a link without a lag is as warm as it."""
+    plain = full_session("tracker").drivers
+    t = plain.t_s - plain.t_s.min()
+    drivers, lag_s = replace(plain, temperatures_degC={"link2": 20.0 + 2e-3 * t}), 0.2 * np.ptp(t)
+    terms = [term for term in LINK_GROWTH.terms(drivers) if term.port.where == "link2.length"]
+    at_once, trailing = (next(term for term in terms if term.variant == v) for v in ("", time_laws.BEHIND))
+    apart = (at_once.basis(drivers, NOTHING) - trailing.basis(drivers, np.array([lag_s])))[:, :3, 0]
+    span = at_once.basis(drivers, NOTHING)[:, :3, 0] / (2e-3 * (t - t.mean()))[:, None]
+    law = 2e-3 * lag_s * -np.expm1(-t / lag_s)
+    assert apart == pytest.approx(law[:, None] * span, abs=1e-9)
+    soon = trailing.basis(drivers, np.array([1e-3 * lag_s]))
+    assert soon == pytest.approx(at_once.basis(drivers, NOTHING), abs=1e-3 * np.ptp(t) * 2e-3)
+
+
+def test_no_link_is_behind_a_thermometer_that_was_not_recorded():
+    drivers = replace(full_session("tracker").drivers, temperatures_degC={})
+    assert time_laws.BEHIND not in {term.variant for term in LINK_GROWTH.terms(drivers)}

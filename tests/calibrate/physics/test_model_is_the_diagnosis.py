@@ -18,6 +18,9 @@ from calibrate.diagnose.blunders_first import Cleared
 from calibrate.diagnose.fitted import fit_geometry
 from calibrate.diagnose.linearised import Accepted
 from calibrate.diagnose.session import session_of
+from calibrate.effects.base_moved import EFFECT as BASE_MOVED
+from calibrate.effects.term import Shape
+from calibrate.effects.time_laws import FOR_A_WHILE
 from calibrate.errors import DataError
 from calibrate.physics.from_diagnosis import model_of_fit
 from calibrate.physics.predicting import as_fitted, predict_with_physics
@@ -119,6 +122,15 @@ def test_every_physics_is_carried(session):
 @pytest.mark.parametrize("session", SESSIONS)
 def test_every_physics_is_carried_at_every_kind_of_place(session):
     assert carry(session, every_place=True) > 60
+
+
+@pytest.mark.parametrize(("variant", "left"), [("", ["base-moved"]), (FOR_A_WHILE, [])])
+def test_a_base_that_stands_as_before_leaves_nothing_behind(variant, left):
+    recording, fit = fitted("cones")
+    term = next(t for t in BASE_MOVED.terms(fit.drivers) if t.shape is Shape.STEP and t.variant == variant)
+    cleared = Cleared(recording.samples, np.arange(SAMPLES), ())
+    model = model_of_fit(with_term(fit, term), fit, cleared, recording, "a base that moved")
+    assert [effect.after for effect in model.effects if effect.holds == "always"] == left
 
 
 def test_a_model_that_predicts_its_session_worse_than_the_fit_is_refused():

@@ -12,11 +12,11 @@ from simulators.conceal.case import conceal
 from simulators.conceal.readings import spots, stand
 from simulators.conceal.rig import DualPsd
 from simulators.conceal.wanted import Wanted
-from simulators.defects.base import BrieflyShiftedBase
+from simulators.defects.base import BrieflyShiftedBase, CarriedBase
 from simulators.defects.detector import CoverGlass, SpottedFace
 from simulators.defects.drive import HystereticSpring, OneSidedSpring, played
 from simulators.defects.encoder import EccentricDisc, OvalRing
-from simulators.defects.fixture import KnockedTable
+from simulators.defects.fixture import CarriedCones, KnockedTable
 from simulators.defects.link import BendingLink, LaggingLink, WornBearing
 from simulators.defects.tracker import DrumOutOfRound
 
@@ -113,6 +113,21 @@ def test_what_was_pushed_back_stands_where_it_stood() -> None:
     scene = SimpleNamespace(t_s=np.array([0.0, 10.0, 19.9, 20.0, 30.0]))
     shift = BrieflyShiftedBase(1e-4, (1.0, 0.0, 0.0), 0.5, (0.0, 0.0, 1.0), 10.0, 20.0)
     np.testing.assert_allclose(shift.base_motion(scene, None)[:, 0, 3], [0.0, 1e-4, 1e-4, 0.0, 0.0], atol=1e-15)
+
+
+def test_a_part_that_is_carried_for_a_while_comes_back() -> None:
+    scene = SimpleNamespace(t_s=np.array([0.0, 10.0, 19.9, 20.0, 30.0]), seat=np.array([1, 2, 1, 1, 2]))
+    away = ((1e-4, 0.0, 0.0), (0.0, 0.0, 1e-3), (0.0, 0.0, 0.0), "while", 10.0, 10.0)
+    foot = CarriedBase(*away).base_motion(scene, None)
+    np.testing.assert_allclose(foot[:, 0, 3], [0.0, 1e-4, 1e-4, 0.0, 0.0], atol=1e-15)
+    np.testing.assert_allclose(foot[:, 1, 0], [0.0, 1e-3, 1e-3, 0.0, 0.0], atol=1e-8)
+
+
+@pytest.mark.parametrize(("cone", "moved"), [(0, [True, True, False]), (2, [False, True, False])])
+def test_a_plate_carries_all_its_cones_or_one_slides_and_bars_are_held_by_hand(cone: int, moved: list[bool]) -> None:
+    scene = SimpleNamespace(t_s=np.zeros(3), seat=np.array([1, 2, 0]))
+    plate = CarriedCones((1e-4, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), "step", cone=cone)
+    np.testing.assert_array_equal(plate.stations_motion(scene)[:, 0, 3] > 0.0, moved)
 
 
 def test_a_casting_follows_a_ramp_of_its_skin_with_one_time_constant() -> None:
