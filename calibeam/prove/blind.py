@@ -39,12 +39,11 @@ def answer(recording: Path, asked: Path, out: Path, simulation: Path) -> None:
     from calibeam.results.diagnosis import diagnose_recording
     from calibrate.diagnose.file import write_diagnosis
 
+    out.mkdir(parents=True, exist_ok=True)
     if simulation.is_dir():
-        out.mkdir(parents=True, exist_ok=True)
         write_json(out / "compare.json", compare(read(recording), read(simulation)))
         return
     found, file = diagnose_recording(read(recording))
-    out.mkdir(parents=True, exist_ok=True)
     write_diagnosis(out / "diagnosis.json", file)
     if found.physics is None or not asked.is_file():
         return

@@ -199,9 +199,8 @@ def publish(layout: Layout, cases: list[Concealed]) -> str:
 def _conceal(order: _Order) -> Concealed:
     drawn, case, simulated, attempts = _drawn(order)
     truth = truth_document(case)
-    truth["defects"] += [
-        one for one in truth["constants"] if drawn.wanted.beside == "constants" and one["enr"] >= PLAIN
-    ]
+    if drawn.wanted.beside == "constants":
+        truth["defects"] += [one for one in truth["constants"] if one["enr"] >= PLAIN]
     recorded = order.layout.recorded(drawn.name)
     if drawn.kind == "streams":
         truth["defects"] = fault_records(conceal_streams(case, order.mix.mechanism, recorded))

@@ -7,7 +7,6 @@ are the seals opened.
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
-from functools import partial
 from pathlib import Path
 
 import msgspec
@@ -79,7 +78,7 @@ def prove_loop(out: Path, cases: int, wired: int, seed: int, jobs: int, tell: Te
         errors: list[str] = []
         names = [one.scenario.name for one in concealed]
         with ThreadPoolExecutor(jobs) as pool:
-            for error in pool.map(partial(_reconciled, layout), names):
+            for error in pool.map(lambda name: reconciled(layout, name, layout.answer(name)), names):
                 errors.append(error)
                 count(f"reconciled {len(errors)} of {total}")
         told = [_told(layout, one, error) for one, error in zip(concealed, errors, strict=True)]
@@ -89,10 +88,6 @@ def prove_loop(out: Path, cases: int, wired: int, seed: int, jobs: int, tell: Te
     text = "".join(f"{line}\n" for line in summary(file.cases)) + "\n" + table_text(file.cases)
     (out / "loop.md").write_text(text, encoding="utf-8")
     return file
-
-
-def _reconciled(layout: Layout, name: str) -> str:
-    return reconciled(layout, name, layout.answer(name))
 
 
 def _told(layout: Layout, one: Concealed, error: str) -> LoopCase:

@@ -32,10 +32,6 @@ from calibeam.prove.record import UNKNOWN, CaseScore, DefectScore, FreeSpace, Na
 from calibeam.prove.scenario import Scenario
 from calibeam.prove.seal import Layout
 from calibeam.prove.unseen import LaserBeam, Tool, read_unseen
-from calibeam.results.comparison import ComparisonFile, DifferenceRecord
-from calibeam.results.reconciliation import ReconcileFile
-from calibrate.diagnose.compare.mismatches import Side
-from calibrate.diagnose.diagnosis import Verdict
 from calibrate.diagnose.file import read_diagnosis
 from calibrate.diagnose.schema import DiagnosisFile, FindingRecord, NameRecord
 
@@ -223,28 +219,29 @@ def _answer(layout: Layout, drawn: Scenario) -> tuple[DiagnosisFile | None, tupl
     """What was reported, and constants that two recordings differ by; no diagnosis where nothing could be sought."""
     if drawn.wanted.beside is None:
         return read_diagnosis(layout.answer(drawn.name) / "diagnosis.json"), ()
-    said = msgspec.json.decode((layout.answer(drawn.name) / "compare.json").read_bytes(), type=ComparisonFile)
-    sides = {(one.where, one.physics): one.side for one in said.differences}
-    constants = tuple(_as_finding(one) for one in said.differences if one.level in OF_GEOMETRY)
-    if said.diagnosis is None:
+    said = msgspec.json.decode((layout.answer(drawn.name) / "compare.json").read_bytes())
+    sides = {(one["where"], one["physics"]): one["side"] for one in said["differences"]}
+    constants = tuple(_as_finding(one) for one in said["differences"] if one["level"] in OF_GEOMETRY)
+    file = msgspec.convert(said["diagnosis"], DiagnosisFile | None)
+    if file is None:
         return None, constants
-    findings = tuple(_sided(f, sides.get((f.where, f.physics), "")) for f in said.diagnosis.findings)
-    return replace(said.diagnosis, verdict=said.verdict, findings=findings), constants
+    findings = tuple(_sided(f, sides.get((f.where, f.physics), "")) for f in file.findings)
+    return replace(file, verdict=said["verdict"], findings=findings), constants
 
 
 def _sided(finding: FindingRecord, side: str) -> FindingRecord:
     """Of a pair the simulation has what is hidden: on another side it is at another place. Sizes: of the simulation."""
-    if side != Side.SIMULATED.value:
+    if side != "simulated":
         return replace(finding, where=f"{side or 'neither'}: {finding.where}")
     sizes = {n: p if p.value is None else replace(p, value=-p.value) for n, p in finding.parameters.items()}
     return replace(finding, parameters=sizes)
 
 
-def _as_finding(one: DifferenceRecord) -> FindingRecord:
-    """A constant, for what is hidden of its kind."""
-    nothing: dict[str, Any] = {"depends_on": "", "shape": "constant", "order": None, "rivals": ()}
-    nothing |= {"share": None, "bic_gain": None, "held_out_gain": None, "confidence": 1.0, "p": one.p or 0.0}
-    return FindingRecord(where=one.where, physics=one.physics, parameters=one.sizes, says=one.says, **nothing)
+def _as_finding(one: dict[str, Any]) -> FindingRecord:
+    """A constant of compare.json, for what is hidden of its kind."""
+    nothing = {"depends_on": "", "shape": "constant", "order": None, "rivals": (), "share": None, "bic_gain": None}
+    nothing |= {"held_out_gain": None, "confidence": 1.0, "p": 0.0, "parameters": one["sizes"]}
+    return msgspec.convert(nothing | {k: one[k] for k in ("where", "physics", "says")}, FindingRecord)
 
 
 def _holds(
@@ -256,14 +253,13 @@ def _holds(
     drawn = concealed.scenario
     if drawn.trouble == REPLAYED:
         path = layout.replayed(drawn.name) / "reconcile.json"
-        said = msgspec.json.decode(path.read_bytes(), type=ReconcileFile) if path.is_file() else None
-        if said is None or not said.unseen:
+        said = msgspec.json.decode(path.read_bytes()) if path.is_file() else {"unseen": ()}
+        if not said["unseen"]:
             return False
-        noise_m = added_noise_m(layout, drawn.name, truth, drawn.wanted.family, said.unseen_rows)
-        return max(one.after_m for one in said.unseen) <= REPLAY_AGREES * noise_m
+        noise_m = added_noise_m(layout, drawn.name, truth, drawn.wanted.family, said["unseen_rows"])
+        return bool(max(one["after_m"] for one in said["unseen"]) <= REPLAY_AGREES * noise_m)
     if drawn.trouble == FEW_ROWS:
-        open_end = file is not None and file.verdict != Verdict.MISMATCH.value
-        return open_end or all(d.located for d in defects)
+        return (file is not None and file.verdict != "mismatch") or all(d.located for d in defects)
     if drawn.wanted.beside == "constants":
         return file is not None and not file.findings and file.unexplained is None
     return None

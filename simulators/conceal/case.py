@@ -144,6 +144,8 @@ def hide(
             continue
         if found is not None and (found.enr > INVISIBLE or not more):
             hidden.append(found)
+    if any(one.enr < wanted.at_least for one in hidden):
+        raise ConcealError(f"no plausible size is {wanted.at_least:g} times the noise; take another seed")
     return hidden
 
 
@@ -261,8 +263,10 @@ MOUNT_RAD = 0.02  # one sigma of how a 6-D target is screwed on
 TURN_RAD = 5e-5  # typical one sigma of a 6-D target's orientation
 
 
-def _with_targets(wanted: Wanted, drawn: DrawnRig, table: Timetable) -> tuple[DrawnRig, Floats, Whole]:
+def _with_targets(wanted: Wanted, drawn: DrawnRig, table: Timetable) -> tuple[DrawnRig, Floats | None, Whole | None]:
     """The rig with the point of each row, the points (target, 3) as assumed, and the number of each row's target."""
+    if wanted.targets == 1:
+        return drawn, None, None
     rng = np.random.default_rng([wanted.seed, 41])
     off_m = np.vstack((np.zeros(3), TARGET_M * rng.standard_normal((wanted.targets - 1, 3))))
     true_m = drawn.true.tool_point_m + off_m
@@ -272,10 +276,13 @@ def _with_targets(wanted: Wanted, drawn: DrawnRig, table: Timetable) -> tuple[Dr
     return replace(drawn, true=true), drawn.believed.tool_point_m + off_m, number + 1
 
 
-def _turns_rad(wanted: Wanted, true: TrueRig, table: Timetable, defects: Sequence[Defect], goal_rad: Floats) -> Floats:
+def _turns_rad(
+    wanted: Wanted, true: TrueRig, table: Timetable, hidden: Sequence[HiddenMechanism], goal_rad: Floats
+) -> Floats | None:
     """(row, 3) what a 6-D target reads of its orientation: rotation vectors in the axes of the device, with noise."""
-    assert isinstance(true.instrument, Device)  # noqa: S101 - narrows the type
-    rng = np.random.default_rng([wanted.seed, 43])
+    if not wanted.six_d or not isinstance(true.instrument, Device):
+        return None
+    rng, defects = np.random.default_rng([wanted.seed, 43]), [one.defect for one in hidden]
     stance = stand(true, table.scene, defects, goal_rad)
     seen = Rotation.from_matrix(flange_turn(true.instrument, table.scene, defects, stance))
     mount = Rotation.from_rotvec(MOUNT_RAD * rng.standard_normal(3))
@@ -298,9 +305,7 @@ def conceal(wanted: Wanted) -> Case:
     habits = draw_habits(wanted, kinds, plan_rng)
     table = draw_timetable(wanted, drawn.true, habits, plan_rng)
     table = replace(table, scene=_with_drifting_thermometer(table.scene, wanted.thermometer_k))
-    targets_m, target = None, None
-    if wanted.targets > 1:
-        drawn, targets_m, target = _with_targets(wanted, drawn, table)
+    drawn, targets_m, target = _with_targets(wanted, drawn, table)
     posture_rad = table.scene.goal_rad
     sigma_m = SIGMA[wanted.family] * float(plan_rng.uniform(0.7, 1.4))
     distances = measure_distances(drawn.true, plan_rng)
@@ -318,8 +323,6 @@ def conceal(wanted: Wanted) -> Case:
     elif kinds:
         scale = scale_of(drawn, table, watch, sigma_m, distances)
         hidden = hide(wanted, kinds, spares(wanted, kinds, hide_rng), site_of(wanted, drawn, table), scale, hide_rng)
-    if any(one.enr < wanted.at_least for one in hidden):
-        raise ConcealError(f"no plausible size is {wanted.at_least:g} times the noise; take another seed")
     exact = watch([one.defect for one in hidden])
     reading_rad, values_m = add_noise(wanted, drawn.true, exact, sigma_m, noise_rng)
     recorded, withheld = choose_columns(wanted, hidden, table, plan_rng)
@@ -327,9 +330,6 @@ def conceal(wanted: Wanted) -> Case:
     if wanted.encoders is not None:
         defects, rng = [one.defect for one in hidden], np.random.default_rng([wanted.seed, 31])
         second_rad = second_readings_rad(drawn.true, table.scene, defects, wanted.encoders, exact.reading_rad, rng)
-    turn_rad = None
-    if wanted.six_d:
-        turn_rad = _turns_rad(wanted, drawn.true, table, [one.defect for one in hidden], posture_rad)
     return Case(
         wanted,
         drawn,
@@ -346,5 +346,5 @@ def conceal(wanted: Wanted) -> Case:
         second_rad,
         noise_rng,
         target,
-        turn_rad,
+        _turns_rad(wanted, drawn.true, table, hidden, posture_rad),
     )

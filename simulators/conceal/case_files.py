@@ -292,15 +292,13 @@ class Made:
 
     off: Mapping[str, float]
     defects: tuple[Defect, ...] = ()
-    exact: bool = False
 
 
 def made(case: Case, how: Made, seed: int) -> Case:
     """The plan of `case` with the nominal arm but for what is `made` of it."""
     true = _arm_off(case, how.off)
     exact = observe(true, case.table.scene, how.defects, case.posture_rad)
-    sigma_m = 0.0 if how.exact else case.sigma_m
-    reading_rad, values_m = add_noise(case.wanted, true, exact, sigma_m, np.random.default_rng(seed))
+    reading_rad, values_m = add_noise(case.wanted, true, exact, case.sigma_m, np.random.default_rng(seed))
     return replace(
         case,
         drawn=replace(case.drawn, true=true),
@@ -318,8 +316,7 @@ def pair_of(case: Case) -> tuple[Case, Case]:
         raise ConcealError("constants are drawn for arms in the notation of Denavit and Hartenberg; take another seed")
     rng = np.random.default_rng([case.wanted.seed, 51])
     off = {name: OFF[name.partition(".")[2]] * rng.standard_normal() for name in _constants(case)}
-    kept = {name: by for name, by in off.items() if rng.random() < OFF_SHARE}
-    measured = made(case, Made(kept), case.wanted.seed + 1)
+    measured = made(case, Made({k: by for k, by in off.items() if rng.random() < OFF_SHARE}), case.wanted.seed + 1)
     return measured, made(case, Made({}, tuple(one.defect for one in case.hidden)), case.wanted.seed + 3)
 
 
@@ -337,12 +334,11 @@ def _arm_off(case: Case, off: Mapping[str, float]) -> TrueRig:
     rows, zero_rad = list(drawing.rows), np.zeros(drawing.n_joints)
     for name, by in off.items():
         owner, _, what = name.partition(".")
-        number = int(owner[-1]) - 1
+        row = int(owner[-1]) - 1
         if what == "zero":
-            zero_rad[number] = by
+            zero_rad[row] = by
         else:
-            # Craig's a and alpha come first
-            row = number + 1 if drawing.model == "mdh" and what != "offset" else number
+            row += drawing.model == "mdh" and what != "offset"  # Craig's a and alpha come first
             rows[row] = replace(rows[row], **{FIELDS[what]: getattr(rows[row], FIELDS[what]) + by})
     fixed = fixed_parts(replace(drawing, rows=tuple(rows))) if off else believed.arm.fixed
     return replace(believed, arm=replace(believed.arm, fixed=fixed, zero_rad=zero_rad))
@@ -361,18 +357,16 @@ def over_noise_of(case: Case) -> dict[str, float]:
         return np.asarray((one - two).ravel() / (2.0 * STEP))
 
     columns = [slope(_arm_off(case, {name: STEP}), _arm_off(case, {name: -STEP})) for name in names]
-    tilts = [f"link{k}.4" for k, T in enumerate(believed.arm.fixed) if abs(T[2, 2]) > 1.0 - PARALLEL]
-    others = [
-        d for d in list_deviations(believed, case.drawn.spread) if not d.name.startswith("link") or d.name in tilts
-    ]
+    tilts = np.abs(believed.arm.fixed[:, 2, 2]) > 1.0 - PARALLEL
+    left_out = {f"link{k}.{axis}" for k, tilt in enumerate(tilts) for axis in range(6) if axis != 4 or not tilt}
+    others = [one for one in list_deviations(believed, case.drawn.spread) if one.name not in left_out]
     columns += [slope(one.apply(believed, STEP), one.apply(believed, -STEP)) for one in others]
     matrix = np.stack(columns, axis=1)
-    matrix /= np.linalg.norm(matrix, axis=0) + np.finfo(float).tiny
-    found: dict[str, float] = {}
-    for name, by in case.off.items():
-        k = names.index(name)
-        rest = np.delete(matrix, k, axis=1)
+    unit = matrix / (np.linalg.norm(matrix, axis=0) + np.finfo(float).tiny)
+
+    def over_noise(k: int, by: float) -> float:
+        rest = np.delete(unit, k, axis=1)
         left = matrix[:, k] - rest @ np.linalg.lstsq(rest, matrix[:, k], rcond=1e-9)[0]
-        size = abs(by) * np.linalg.norm(left) * np.linalg.norm(columns[k])
-        found[name] = float(size / (np.sqrt(2.0 * len(left)) * case.sigma_m))
-    return found
+        return float(abs(by) * np.sqrt(0.5 * np.mean(left**2)) / case.sigma_m)
+
+    return {name: over_noise(names.index(name), by) for name, by in case.off.items()}

@@ -218,7 +218,7 @@ def draw_timetable(wanted: Wanted, true: TrueRig, habits: Habits, rng: np.random
         return timetable(reading_rad, none, none, seat, habits, rng, linked)
     if not isinstance(instrument, DualPsd):
         if wanted.samples < FEW:
-            few = none[: wanted.samples]
+            few = np.zeros(wanted.samples, dtype=np.int64)
             return timetable(free_poses(true.arm, few.size, rng), few, few, few, habits, rng, repeated=0)
         return timetable(free_poses(true.arm, poses, rng), none, none, none, habits, rng)
     each = [poses // wanted.places + (k < poses % wanted.places) for k in range(wanted.places)]
