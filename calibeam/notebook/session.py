@@ -108,7 +108,7 @@ class Session:
 
         found, file = diagnose_recording(self.recording)
         if found.physics is None:
-            raise DataError("; besides, ".join(blunder.says for blunder in found.blunders))
+            raise DataError(found.why_not)
         return file
 
 

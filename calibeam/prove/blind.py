@@ -27,15 +27,23 @@ class NoSimulators:
         return None
 
 
-def answer(recording: Path, asked: Path, out: Path) -> None:
-    """Writes diagnosis.json and, where both models have it, unseen.npz with the tool at the poses asked."""
+def answer(recording: Path, asked: Path, out: Path, simulation: Path) -> None:
+    """Writes diagnosis.json and, where both models have it, unseen.npz with the tool at the poses asked.
+
+    Where there is a simulation, compare.json instead.
+    """
     from acquisition.recording import read
+    from acquisition.recording.files import write_json
     from calibeam.prove.unseen import read_asked, tool_at, write_unseen
+    from calibeam.results.comparison import compare
     from calibeam.results.diagnosis import diagnose_recording
     from calibrate.diagnose.file import write_diagnosis
 
-    found, file = diagnose_recording(read(recording))
     out.mkdir(parents=True, exist_ok=True)
+    if simulation.is_dir():
+        write_json(out / "compare.json", compare(read(recording), read(simulation)))
+        return
+    found, file = diagnose_recording(read(recording))
     write_diagnosis(out / "diagnosis.json", file)
     if found.physics is None or not asked.is_file():
         return
@@ -63,7 +71,7 @@ def main(without: Sequence[str]) -> None:
         order = json.loads(line)
         began_s, error = time.process_time(), ""
         try:
-            answer(Path(order["recording"]), Path(order["asked"]), Path(order["out"]))
+            answer(*(Path(order[name]) for name in ("recording", "asked", "out", "simulation")))
         except Exception as reason:
             error = f"{type(reason).__name__}: {reason}"
         print(json.dumps({"cpu_s": time.process_time() - began_s, "error": error}), flush=True)

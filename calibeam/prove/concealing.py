@@ -22,6 +22,7 @@ from calibeam.devices.site import addresses_of, connected
 from calibeam.emulation import EmulationError
 from calibeam.outcome import PartialResult
 from calibeam.printing.progress import progress_bar
+from calibeam.prove.record import PLAIN
 from calibeam.prove.scenario import DRAWS, WIRED_DRAWS, Mix, Scenario, scenario, wired_scenario
 from calibeam.prove.seal import Layout, fingerprint, new_key, seal_truth
 from calibeam.prove.unseen import write_asked
@@ -32,7 +33,7 @@ from calibrate.diagnose.streams.sample_times import sample_windows
 from drivers.clock import SystemClock
 from drivers.errors import DeviceError
 from simulators.conceal.case import Case, conceal
-from simulators.conceal.case_files import columns, csv_text, truth_document
+from simulators.conceal.case_files import columns, csv_text, pair_of, truth_document
 from simulators.conceal.on_wire import Taken, Wired, draw_wired, taken_case
 from simulators.conceal.rig_file import rig_document, toml_text
 from simulators.conceal.wanted import ConcealError, Wanted
@@ -196,13 +197,17 @@ def publish(layout: Layout, cases: list[Concealed]) -> str:
 
 
 def _conceal(order: _Order) -> Concealed:
-    drawn, case, attempts = _drawn(order)
+    drawn, case, simulated, attempts = _drawn(order)
     truth = truth_document(case)
+    if drawn.wanted.beside == "constants":
+        truth["defects"] += [one for one in truth["constants"] if one["enr"] >= PLAIN]
     recorded = order.layout.recorded(drawn.name)
     if drawn.kind == "streams":
         truth["defects"] = fault_records(conceal_streams(case, order.mix.mechanism, recorded))
     elif not order.wired:
         write_recording(case, order.layout.recording(drawn.name))
+    if simulated is not None:
+        write_recording(simulated, order.layout.simulation(drawn.name))
     text = json.dumps(truth).encode()
     write_asked(truth["free_space"], order.layout.asked(drawn.name))
     seal = order.layout.seal(drawn.name)
@@ -211,7 +216,8 @@ def _conceal(order: _Order) -> Concealed:
     return Concealed(drawn, fingerprint(text), order.key, attempts)
 
 
-def _drawn(order: _Order) -> tuple[Scenario, Case, int]:
+def _drawn(order: _Order) -> tuple[Scenario, Case, Case | None, int]:
+    """With the simulation, if one stands beside it, and the number of attempts that gave no session."""
     last: ConcealError | None = None
     for attempt in range(WIRED_DRAWS if order.wired else DRAWS):
         try:
@@ -219,9 +225,11 @@ def _drawn(order: _Order) -> tuple[Scenario, Case, int]:
                 # what a session over wires needs, devices' libraries and all, is a second of each process that has none
 
                 drawn = wired_scenario(order.mix, order.seed, order.number, attempt)
-                return drawn, conceal_on_wires(drawn.wanted, order.layout.recorded(drawn.name)), attempt
+                return drawn, conceal_on_wires(drawn.wanted, order.layout.recorded(drawn.name)), None, attempt
             drawn = scenario(order.mix, order.seed, order.number, attempt)
-            return drawn, conceal(drawn.wanted), attempt
+            case = conceal(drawn.wanted)
+            measured, simulated = (case, None) if drawn.wanted.beside is None else pair_of(case)
+            return drawn, measured, simulated, attempt
         except ConcealError as reason:
             last = reason
     raise ConcealError(f"case {order.number}: no draw gave a session; the last one: {last}")

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from queue import SimpleQueue
 
+from acquisition.recording import read
 from calibeam.devices.recorder import uninterrupted
 from calibeam.prove.seal import Layout
 
@@ -54,6 +55,7 @@ class Blind:
             "recording": str(layout.recording(name).absolute()),
             "asked": str(layout.asked(name).absolute()),
             "out": str(layout.answer(name).absolute()),
+            "simulation": str(layout.simulation(name).absolute()),
         }
         stdin, stdout = self._child.stdin, self._child.stdout
         if stdin is None or stdout is None:
@@ -131,3 +133,24 @@ def diagnose_cases(layout: Layout, names: Sequence[str], jobs: int, without: Seq
         with uninterrupted():
             for blind in begun:
                 blind.close()
+
+
+def reconciled(layout: Layout, name: str, out: Path) -> str:
+    """Brings a simulation of the recording's own rig file to agree with it, by the command; results in `out`.
+
+    What went wrong; empty where nothing did.
+    """
+    recording = layout.recording(name).absolute()
+    layout.answers.mkdir(parents=True, exist_ok=True)
+    rig = layout.answers.absolute() / f"{name}-rig.toml"
+    rig.write_text(read(recording).rig_text, encoding="utf-8")
+    words = ["reconcile", str(recording), "--simulation", str(rig)]
+    done = subprocess.run(  # noqa: S603 - our own interpreter and our own command
+        [sys.executable, "-m", "calibeam", *words, "--out", str(out.absolute())],
+        capture_output=True,
+        text=True,
+        env=bare_environment(os.environ),
+        cwd=layout.answers,
+        check=False,
+    )
+    return "" if done.returncode == 0 else " ".join(done.stderr.split()) or f"ended with code {done.returncode}"

@@ -4,25 +4,20 @@ Each case is reconciled by the command itself, in a process that gets a recordin
 are the seals opened.
 """
 
-import os
-import subprocess
-import sys
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
-from functools import partial
 from pathlib import Path
 
 import msgspec
 import numpy as np
 
-from acquisition.recording import read
 from calibeam.prove.concealing import Concealed, conceal_cases, publish
-from calibeam.prove.diagnosing import bare_environment
+from calibeam.prove.diagnosing import reconciled
 from calibeam.prove.prove import Tell, ending_early, fresh
 from calibeam.prove.record import Truth, truth_of
 from calibeam.prove.scenario import Kind, Mix
-from calibeam.prove.scoring import noise_m
+from calibeam.prove.scoring import added_noise_m
 from calibeam.prove.seal import Layout, open_seal
 from calibeam.results.reconciliation import AGREES, ReconcileFile
 from calibeam.software import SOFTWARE
@@ -83,7 +78,7 @@ def prove_loop(out: Path, cases: int, wired: int, seed: int, jobs: int, tell: Te
         errors: list[str] = []
         names = [one.scenario.name for one in concealed]
         with ThreadPoolExecutor(jobs) as pool:
-            for error in pool.map(partial(_reconciled, layout), names):
+            for error in pool.map(lambda name: reconciled(layout, name, layout.answer(name)), names):
                 errors.append(error)
                 count(f"reconciled {len(errors)} of {total}")
         told = [_told(layout, one, error) for one, error in zip(concealed, errors, strict=True)]
@@ -93,24 +88,6 @@ def prove_loop(out: Path, cases: int, wired: int, seed: int, jobs: int, tell: Te
     text = "".join(f"{line}\n" for line in summary(file.cases)) + "\n" + table_text(file.cases)
     (out / "loop.md").write_text(text, encoding="utf-8")
     return file
-
-
-def _reconciled(layout: Layout, name: str) -> str:
-    """What went wrong; empty where nothing did."""
-    recording = layout.recording(name).absolute()
-    layout.answers.mkdir(parents=True, exist_ok=True)
-    rig = layout.answers.absolute() / f"{name}-rig.toml"
-    rig.write_text(read(recording).rig_text, encoding="utf-8")
-    words = ["reconcile", str(recording), "--simulation", str(rig)]
-    done = subprocess.run(  # noqa: S603 - our own interpreter and our own command
-        [sys.executable, "-m", "calibeam", *words, "--out", str(layout.answer(name).absolute())],
-        capture_output=True,
-        text=True,
-        env=bare_environment(os.environ),
-        cwd=layout.answers,
-        check=False,
-    )
-    return "" if done.returncode == 0 else " ".join(done.stderr.split()) or f"ended with code {done.returncode}"
 
 
 def _told(layout: Layout, one: Concealed, error: str) -> LoopCase:
@@ -125,8 +102,7 @@ def _told(layout: Layout, one: Concealed, error: str) -> LoopCase:
     diagnosis = read_diagnosis(folder / "diagnosis.json")
     found = tuple(f"{f.physics} at {f.where}" for f in diagnosis.findings)
     worst = max(file.unseen, key=lambda u: u.after)
-    noise = noise_m(read(layout.recording(name)).samples, truth, family)
-    added_m = float(np.sqrt(np.nanmean(noise[list(file.unseen_rows)] ** 2)))
+    added_m = added_noise_m(layout, name, truth, family, file.unseen_rows)
     far = worst.before_m / added_m, worst.geometry_m / added_m, worst.after_m / added_m, worst.after
     failure = "; ".join(_failures(truth, diagnosis, worst.after_m / added_m))
     return LoopCase(name, kind, family, path, hidden, found, *far, file.verdict, failure)

@@ -11,8 +11,9 @@ import msgspec
 from calibeam.outcome import PartialResult, interruption
 from calibeam.prove.comparison import compared_cases
 from calibeam.prove.concealing import Concealed, conceal_cases, publish
-from calibeam.prove.diagnosing import Answered, diagnose_cases
+from calibeam.prove.diagnosing import Answered, diagnose_cases, reconciled
 from calibeam.prove.page import write_proof_page
+from calibeam.prove.raised import REPLAYED
 from calibeam.prove.record import SCHEMA, ProofFile, Truth, truth_of
 from calibeam.prove.scenario import DEVELOPMENT, Mix
 from calibeam.prove.scoring import score
@@ -83,6 +84,9 @@ def _proved(layout: Layout, plan: Plan, tell: Tell, count: Tell, command: str) -
         for answer in answers:
             answered.append(answer)
             count(f"diagnosed {len(answered)} of {total}")
+    for one in concealed:
+        if one.scenario.trouble == REPLAYED:
+            reconciled(layout, one.scenario.name, layout.replayed(one.scenario.name))
     truths = [_opened(layout, c, plan.without) for c in concealed]
     scored = [score(layout, c, a, t) for c, a, t in zip(concealed, answered, truths, strict=True)]
     scored = compared_cases(layout, scored, truths, plan.compare, plan.jobs, count)

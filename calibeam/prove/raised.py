@@ -1,7 +1,8 @@
 """Troubles that were met on real robots, as cases of the kind `raised`: each in turn, on request.
 
 What each may be called, and where, follows from its mechanism (`simulators.defects.RAISED`). Two have none: a rig file
-in the wrong convention, and a thermometer that nothing depends on.
+in the wrong convention, and a thermometer that nothing depends on. Of some more than one diagnosis is asked: a
+comparison with a simulation, or a replay.
 """
 
 from collections.abc import Callable, Mapping
@@ -41,10 +42,23 @@ def _drifting(rng: Generator) -> dict[str, Any]:
     return {"thermometer_k": float(rng.choice([-1.0, 1.0]) * rng.uniform(2.0, 6.0))}
 
 
+def _always(**changes: Any) -> Callable[[Generator], dict[str, Any]]:
+    return lambda rng: dict(changes)
+
+
+def _few(rng: Generator) -> dict[str, Any]:
+    enr = float(rng.uniform(PLAIN_IN_FEW, 2.0 * PLAIN_IN_FEW))
+    return {"samples": int(rng.integers(12, 20)), "enr": enr, "at_least": 0.95 * PLAIN_IN_FEW}
+
+
 def _hidden(*names: str, families: tuple[Family, ...]) -> Mapping[Family, tuple[tuple[str, ...], ...]]:
     return dict.fromkeys(families, (names,))
 
 
+PLAIN_IN_FEW = 3.0  # effect over noise
+REPLAYED = "three-targets"  # `reconcile` is asked, too
+FEW_ROWS = "few-rows"
+OF_JOINTS = (("soft-joint",), ("slack-drive",), ("encoder-eccentricity",))
 ROBOTS: tuple[Family, ...] = ("dual-psd", "tracker")
 DRIVEN: tuple[Family, ...] = ("dual-psd", "tracker", "wire")
 TROUBLES: Mapping[str, Trouble] = {
@@ -61,4 +75,9 @@ TROUBLES: Mapping[str, Trouble] = {
     "confused-convention": Trouble(_hidden(families=ROBOTS), lambda rng: {"confused": True}),
     "missing-column": Trouble(_hidden("any", families=DRIVEN), lambda rng: {"withhold": True}),
     "room-temperature": Trouble(_hidden(families=(*ROBOTS, "cones")), _drifting),
+    "simulation-has-too-much": Trouble({"tracker": (*OF_JOINTS, ("bending-link",))}, _always(beside="too-much")),
+    "geometry-off": Trouble(_hidden(families=("tracker",)), _always(beside="constants")),
+    REPLAYED: Trouble({"tracker": OF_JOINTS}, _always(targets=3)),
+    FEW_ROWS: Trouble({"tracker": OF_JOINTS}, _few),
+    "six-d-target": Trouble({"tracker": (*OF_JOINTS, ("bending-link",))}, _always(six_d=True)),
 }

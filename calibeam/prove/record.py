@@ -111,6 +111,7 @@ class CaseScore(ProofRecord, frozen=True):
     baselines: tuple[BaselineScore, ...] = ()
     path: str = "in process"  # or "on wires": how the recording came about
     trouble: str = ""  # of the kind `raised`
+    holds: bool | None = None  # what a trouble asks beside its cause; None: nothing
 
     @property
     def alarmed(self) -> bool:

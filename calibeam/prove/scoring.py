@@ -14,7 +14,9 @@ import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
+import msgspec
 import numpy as np
 from msgspec.structs import replace
 from numpy.typing import NDArray
@@ -25,8 +27,9 @@ from acquisition.recording import Samples, read
 from acquisition.recording.samples import POSITION, SPOTS
 from calibeam.prove.concealing import Concealed
 from calibeam.prove.diagnosing import Answered
-from calibeam.prove.raised import SAID_OF_CONVENTION
+from calibeam.prove.raised import FEW_ROWS, REPLAYED, SAID_OF_CONVENTION
 from calibeam.prove.record import UNKNOWN, CaseScore, DefectScore, FreeSpace, NamedCause, SizeScore, TrueDefect, Truth
+from calibeam.prove.scenario import Scenario
 from calibeam.prove.seal import Layout
 from calibeam.prove.unseen import LaserBeam, Tool, read_unseen
 from calibrate.diagnose.file import read_diagnosis
@@ -94,6 +97,11 @@ def noise_m(samples: Samples, truth: Truth, family: str) -> Floats:
     return np.asarray(recorded - np.array(truth.exact.values_m), dtype=np.float64)
 
 
+def added_noise_m(layout: Layout, name: str, truth: Truth, family: str, rows: Sequence[int]) -> float:
+    """Rms of what was added to these rows of a recording."""
+    return float(np.sqrt(np.nanmean(noise_m(read(layout.recording(name)).samples, truth, family)[list(rows)] ** 2)))
+
+
 def floor_m(samples: Samples, truth: Truth, family: str) -> float | None:
     """Rms of the noise over all readings but wild ones, m. None for cones: their noise is in the encoders."""
     if family not in CHANNELS:
@@ -159,14 +167,16 @@ def _rms(errors: Floats) -> float:
 
 
 FAILED = "failed"
+OF_GEOMETRY = ("joint-zeros", "links")  # levels of a comparison
+REPLAY_AGREES = 2.0  # times the noise that was added
 TIED = 0.5  # of BIC: reported as equal
 
 
 def score(layout: Layout, concealed: Concealed, answered: Answered, truth: Truth) -> CaseScore:
     """Of an opened seal and an answer; a diagnosis that did not end has reported nothing."""
     drawn, wanted = concealed.scenario, concealed.scenario.wanted
-    file = None if answered.error else read_diagnosis(layout.answer(drawn.name) / "diagnosis.json")
-    own = _own(truth.defects, () if file is None else file.findings, wanted.family)
+    file, constants = (None, ()) if answered.error else _answer(layout, drawn)
+    own = _own(truth.defects, constants if file is None else (*file.findings, *constants), wanted.family)
     left = _left_over(file)
     defects = tuple(
         _defect(d, findings, left if drawn.trouble or d.physics == UNKNOWN else (), wanted.family)
@@ -201,7 +211,58 @@ def score(layout: Layout, concealed: Concealed, answered: Answered, truth: Truth
         error=answered.error,
         path=drawn.path,
         trouble=drawn.trouble,
+        holds=_holds(layout, concealed, truth, file, defects),
     )
+
+
+def _answer(layout: Layout, drawn: Scenario) -> tuple[DiagnosisFile | None, tuple[FindingRecord, ...]]:
+    """What was reported, and constants that two recordings differ by; no diagnosis where nothing could be sought."""
+    if drawn.wanted.beside is None:
+        return read_diagnosis(layout.answer(drawn.name) / "diagnosis.json"), ()
+    said = msgspec.json.decode((layout.answer(drawn.name) / "compare.json").read_bytes())
+    sides = {(one["where"], one["physics"]): one["side"] for one in said["differences"]}
+    constants = tuple(_as_finding(one) for one in said["differences"] if one["level"] in OF_GEOMETRY)
+    file = msgspec.convert(said["diagnosis"], DiagnosisFile | None)
+    if file is None:
+        return None, constants
+    findings = tuple(_sided(f, sides.get((f.where, f.physics), "")) for f in file.findings)
+    return replace(file, verdict=said["verdict"], findings=findings), constants
+
+
+def _sided(finding: FindingRecord, side: str) -> FindingRecord:
+    """Of a pair the simulation has what is hidden: on another side it is at another place. Sizes: of the simulation."""
+    if side != "simulated":
+        return replace(finding, where=f"{side or 'neither'}: {finding.where}")
+    sizes = {n: p if p.value is None else replace(p, value=-p.value) for n, p in finding.parameters.items()}
+    return replace(finding, parameters=sizes)
+
+
+def _as_finding(one: dict[str, Any]) -> FindingRecord:
+    """A constant of compare.json, for what is hidden of its kind."""
+    nothing = {"depends_on": "", "shape": "constant", "order": None, "rivals": (), "share": None, "bic_gain": None}
+    nothing |= {"held_out_gain": None, "confidence": 1.0, "p": 0.0, "parameters": one["sizes"]}
+    return msgspec.convert(nothing | {k: one[k] for k in ("where", "physics", "says")}, FindingRecord)
+
+
+def _holds(
+    layout: Layout, concealed: Concealed, truth: Truth, file: DiagnosisFile | None, defects: Sequence[DefectScore]
+) -> bool | None:
+    """What the trouble asks beside its cause: that a replay agrees, that few rows are no mismatch without a cause, that
+    constants are no effect.
+    """
+    drawn = concealed.scenario
+    if drawn.trouble == REPLAYED:
+        path = layout.replayed(drawn.name) / "reconcile.json"
+        said = msgspec.json.decode(path.read_bytes()) if path.is_file() else {"unseen": ()}
+        if not said["unseen"]:
+            return False
+        noise_m = added_noise_m(layout, drawn.name, truth, drawn.wanted.family, said["unseen_rows"])
+        return bool(max(one["after_m"] for one in said["unseen"]) <= REPLAY_AGREES * noise_m)
+    if drawn.trouble == FEW_ROWS:
+        return (file is not None and file.verdict != "mismatch") or all(d.located for d in defects)
+    if drawn.wanted.beside == "constants":
+        return file is not None and not file.findings and file.unexplained is None
+    return None
 
 
 def _names_convention(file: DiagnosisFile | None, error: str) -> bool:

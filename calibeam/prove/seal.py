@@ -27,6 +27,10 @@ class Layout:
         folder = self.out / "recordings" / name
         return folder / RECORDED if (folder / RECORDED).is_file() else folder
 
+    def simulation(self, name: str) -> Path:
+        """A simulation of the same session, where there is one."""
+        return self.out / "simulations" / name
+
     def recorded(self, name: str) -> Path:
         """The file of a session that is recorded."""
         return self.out / "recordings" / name / RECORDED
@@ -43,6 +47,10 @@ class Layout:
     def answer(self, name: str) -> Path:
         """What the diagnosing process writes."""
         return self.answers / name
+
+    def replayed(self, name: str) -> Path:
+        """What `reconcile` writes, where it is asked."""
+        return self.answer(name) / "replayed"
 
     def seal(self, name: str) -> Path:
         """The truth, unreadable."""

@@ -178,7 +178,7 @@ def between_encoders(cases: Sequence[CaseScore]) -> list[TallyLine]:
     return [_line(word, [c for c in ones if c.defects[0].mechanism == word]) for word in words]
 
 
-OF_TROUBLES = ("cases", "located", "named", "asks for the column", "misnamed (>= 0.5)", "false alarms")
+OF_TROUBLES = ("cases", "located", "named", "asks for the column", "misnamed (>= 0.5)", "false alarms", "holds besides")
 
 
 def by_trouble(cases: Sequence[CaseScore]) -> list[tuple[str, tuple[Share, ...]]]:
@@ -197,6 +197,7 @@ def _shares_of_trouble(cases: Sequence[CaseScore], all_cases: int) -> tuple[Shar
         share(c.asks_for for c in cases if c.withheld),
         share(any(s.misnamed_from(SURE) for s in c.said) for c in cases),
         share(c.alarmed for c in cases if not c.defects),
+        share(c.holds for c in cases if c.holds is not None),
     )
 
 

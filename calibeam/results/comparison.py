@@ -310,8 +310,8 @@ def _asked(
     except (DataError, np.linalg.LinAlgError) as why:
         return _Asked(None, (), None, (), f"the difference could not be explained: {why}"), here, alike
     if found.diagnosed.physics is None:
-        says = "; besides, ".join(one.says for one in found.diagnosed.blunders)
-        return _Asked(None, (), None, (), f"the difference could not be explained: {says}"), here, alike
+        why = f"the difference could not be explained: {found.diagnosed.why_not}"
+        return _Asked(None, (), None, (), why), here, alike
     source = replace(measured, rig=simulated.rig, rig_text=simulated.rig_text, streams={}, events=())
     file = file_of(found.diagnosed, source)
     after = found.diagnosed.physics.model

@@ -117,7 +117,7 @@ def plan_next(found: Diagnosed, path: Path) -> str:
     OSError where it cannot be written.
     """
     if found.physics is None:
-        return "no plan: the file is to be put right first"
+        return "no plan: no cause was sought; the diagnosis states why"
     physics = found.physics
     try:
         chosen = separating(physics.diagnosis, np.random.default_rng(SEED))
@@ -135,13 +135,16 @@ def plan_next(found: Diagnosed, path: Path) -> str:
 
 
 def refuse_wrong_file(found: Diagnosed, path: Path) -> None:
-    """DataError where the whole file is wrong or cannot be fitted, after that has been written to `path`."""
-    if found.physics is None and found.incomplete:
+    """DataError where the whole file is wrong or cannot be fitted, after that has been written to `path`.
+
+    Too few samples are no fault: they decide nothing.
+    """
+    if found.physics is not None or any(one.stage is Stage.SEARCH for one in found.incomplete):
+        return
+    if found.incomplete:
         said = "; ".join(f"{one.stage.value}: {one.reason}" for one in found.incomplete)
         raise DataError(f"no diagnosis, {said} (also in {path})")
-    if found.physics is None:
-        said = "; besides, ".join(blunder.says for blunder in found.blunders)
-        raise DataError(f"{said} (also in {path}); no physics is sought before that is put right")
+    raise DataError(f"{found.why_not} (also in {path}); no physics is sought before that is put right")
 
 
 def diagnose_to_file(recording: Recording, path: Path) -> tuple[Diagnosed, DiagnosisFile]:

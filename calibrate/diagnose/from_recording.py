@@ -30,7 +30,6 @@ from calibrate.diagnose.tail import LEAST
 from calibrate.diagnose.wild_rows import unexplained_rows
 from calibrate.effects.catalogue import missing_of
 from calibrate.effects.term import Missing
-from calibrate.errors import DataError
 from calibrate.identification.session import columns_of
 from calibrate.sensors.encoder_difference import NAME as ENCODER_DIFFERENCE
 from calibrate.weighting import Measured
@@ -56,12 +55,17 @@ class Physics:
 
 @dataclass(frozen=True, eq=False)
 class Diagnosed:
-    """`physics` is None where the whole file is wrong, or geometry could not be fitted: nothing was sought then."""
+    """`physics` is None where nothing was sought: the whole file is wrong, no geometry fits, or samples are too few."""
 
     cleared: Cleared
     blunders: tuple[Blunder, ...]  # of the file, and rows that no model explains
     physics: Physics | None
     incomplete: tuple[Incomplete, ...] = ()  # stages without a result, where there is no physics
+
+    @property
+    def why_not(self) -> str:
+        """Why nothing was sought, where nothing was."""
+        return "; besides, ".join([*(one.says for one in self.blunders), *(one.reason for one in self.incomplete)])
 
 
 def diagnose_samples(
@@ -75,7 +79,7 @@ def diagnose_samples(
     """`begin`: the fit beside which something is sought, geometry alone or what a model knows already. `known` is
     called once as soon as the causes are known, before sizes, alternatives and proofs; `begun` as each stage begins.
 
-    DataError where there is too little to diagnose.
+    DataError where the rows cannot be read as a session of the rig; of too few nothing is sought.
     """
     stages = Stages(begun=begun)
     every = Cleared(samples, np.arange(len(samples)), ())
@@ -83,11 +87,9 @@ def diagnose_samples(
     if cleared.whole_file:
         return Diagnosed(cleared, cleared.blunders, None)
     if len(cleared.rows) < FEWEST:
-        raise DataError(
-            f"{len(cleared.rows)} samples are left to diagnose, fewer than {FEWEST}: no cause can be separated from "
-            "noise; "
-            "measure more poses"
-        )
+        few = f"{len(cleared.rows)} samples are left to diagnose, fewer than {FEWEST}"
+        why = f"{few}: no cause can be separated from noise; measure more poses"
+        return Diagnosed(cleared, cleared.blunders, None, (Incomplete(Stage.SEARCH, why),))
     geometry = stages.attempt(Stage.GEOMETRY, lambda: begin(session_of(rig, cleared.samples)), None, refuses=True)
     if geometry is None:
         return Diagnosed(cleared, cleared.blunders, None, stages.failed)

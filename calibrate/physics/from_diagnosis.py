@@ -81,7 +81,7 @@ UNITS = ("rad_nm", "per_k", "rad", "m", "s", "nm", "share", "k")
 def model_of_diagnosis(found: Diagnosed, recording: Recording) -> ModelFile:
     """The record to write. DataError where the file is wrong as a whole, or an effect cannot be carried."""
     if found.physics is None:
-        raise DataError("no model: the whole file is wrong; how is in diagnosis.json")
+        raise DataError("no model: no cause was sought; diagnosis.json states why")
     if found.physics.model.problem.assumed is not None:
         raise DataError(
             "no model: beside a model of another recording a diagnosis fits changes only; `calibeam identify --model` "

@@ -4,11 +4,12 @@ Mechanisms are chosen from what the session's rig has room for, and each is scal
 """
 
 import zlib
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from simulators.arm.kinematics import forward
 from simulators.arm.statics import weigh
@@ -23,7 +24,8 @@ from simulators.conceal.observe import (
     shaken_rad,
 )
 from simulators.conceal.plan import Timetable, draw_habits, draw_timetable
-from simulators.conceal.rig import ENCODER_RAD, Artefacts, DualPsd, TrueRig
+from simulators.conceal.readings import flange_turn, stand
+from simulators.conceal.rig import ENCODER_RAD, Artefacts, Device, DualPsd, TrueRig
 from simulators.conceal.rig_file import Belief, believe
 from simulators.conceal.rigs import DrawnRig, draw_rig
 from simulators.conceal.wanted import INSTRUMENT, ConcealError, Wanted, draw_noise
@@ -142,6 +144,8 @@ def hide(
             continue
         if found is not None and (found.enr > INVISIBLE or not more):
             hidden.append(found)
+    if any(one.enr < wanted.at_least for one in hidden):
+        raise ConcealError(f"no plausible size is {wanted.at_least:g} times the noise; take another seed")
     return hidden
 
 
@@ -179,6 +183,7 @@ def _same(one: Defect, other: Defect) -> bool:
 
 
 Floats = NDArray[np.float64]
+Whole = NDArray[np.int64]
 
 
 def add_noise(
@@ -248,6 +253,41 @@ class Case:
     withheld: tuple[str, ...]
     second_rad: Floats | None  # (row, n) what second encoders read; None: there are none
     rng: np.random.Generator  # for what is still to be drawn when the table is written
+    target: Whole | None = None  # (row,) of several
+    turn_rad: Floats | None = None  # (row, 3) rotation vectors as recorded; None: no 6-D target
+    off: Mapping[str, float] = field(default_factory=dict)  # constants beside those of the simulation, by model.json
+
+
+TARGET_M = 0.08  # one sigma of where further targets sit about the first
+MOUNT_RAD = 0.02  # one sigma of how a 6-D target is screwed on
+TURN_RAD = 5e-5  # typical one sigma of a 6-D target's orientation
+
+
+def _with_targets(wanted: Wanted, drawn: DrawnRig, table: Timetable) -> tuple[DrawnRig, Floats | None, Whole | None]:
+    """The rig with the point of each row, the points (target, 3) as assumed, and the number of each row's target."""
+    if wanted.targets == 1:
+        return drawn, None, None
+    rng = np.random.default_rng([wanted.seed, 41])
+    off_m = np.vstack((np.zeros(3), TARGET_M * rng.standard_normal((wanted.targets - 1, 3))))
+    true_m = drawn.true.tool_point_m + off_m
+    true_m[1:] += drawn.spread.tool_m * rng.standard_normal((wanted.targets - 1, 3))
+    number = table.pose % wanted.targets  # repeats are of one target
+    true = replace(drawn.true, tool_point_m=true_m[number])
+    return replace(drawn, true=true), drawn.believed.tool_point_m + off_m, number + 1
+
+
+def _turns_rad(
+    wanted: Wanted, true: TrueRig, table: Timetable, hidden: Sequence[HiddenMechanism], goal_rad: Floats
+) -> Floats | None:
+    """(row, 3) what a 6-D target reads of its orientation: rotation vectors in the axes of the device, with noise."""
+    if not wanted.six_d or not isinstance(true.instrument, Device):
+        return None
+    rng, defects = np.random.default_rng([wanted.seed, 43]), [one.defect for one in hidden]
+    stance = stand(true, table.scene, defects, goal_rad)
+    seen = Rotation.from_matrix(flange_turn(true.instrument, table.scene, defects, stance))
+    mount = Rotation.from_rotvec(MOUNT_RAD * rng.standard_normal(3))
+    noise = Rotation.from_rotvec(TURN_RAD * rng.uniform(0.7, 1.4) * rng.standard_normal((len(table.scene), 3)))
+    return (noise * seen * mount).as_rotvec()
 
 
 def _with_drifting_thermometer(scene: Scene, drift_k: float) -> Scene:
@@ -265,6 +305,7 @@ def conceal(wanted: Wanted) -> Case:
     habits = draw_habits(wanted, kinds, plan_rng)
     table = draw_timetable(wanted, drawn.true, habits, plan_rng)
     table = replace(table, scene=_with_drifting_thermometer(table.scene, wanted.thermometer_k))
+    drawn, targets_m, target = _with_targets(wanted, drawn, table)
     posture_rad = table.scene.goal_rad
     sigma_m = SIGMA[wanted.family] * float(plan_rng.uniform(0.7, 1.4))
     distances = measure_distances(drawn.true, plan_rng)
@@ -292,7 +333,7 @@ def conceal(wanted: Wanted) -> Case:
     return Case(
         wanted,
         drawn,
-        believe(wanted, drawn, distances, sigma_m, plan_rng),
+        replace(believe(wanted, drawn, distances, sigma_m, plan_rng), targets_m=targets_m),
         table,
         posture_rad,
         hidden,
@@ -304,4 +345,6 @@ def conceal(wanted: Wanted) -> Case:
         withheld,
         second_rad,
         noise_rng,
+        target,
+        _turns_rad(wanted, drawn.true, table, hidden, posture_rad),
     )

@@ -2,13 +2,16 @@
 
 `recording` holds samples.csv and rig.toml. truth.json in `sealed` holds everything that was hidden, and the readings of
 an exact instrument.
+
+Beside it, if asked for, the same plan by a simulation: the nominal arm of the rig file, with or without mechanisms. The
+measured arm is the nominal one, too, but for constants by which it is off.
 """
 
 import csv
 import io
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -17,13 +20,15 @@ from numpy.typing import NDArray
 
 from simulators.arm.drawing import fixed_parts
 from simulators.arm.kinematics import forward
-from simulators.conceal.case import Case, HiddenMechanism
-from simulators.conceal.observe import at_the_flange
+from simulators.conceal.case import Case, HiddenMechanism, add_noise
+from simulators.conceal.effect_over_noise import STEP, list_deviations
+from simulators.conceal.observe import at_the_flange, observe
 from simulators.conceal.poses import free_poses
 from simulators.conceal.readings import stand, tip_m
 from simulators.conceal.rig import ENCODER_RAD, Artefacts, Device, DualPsd, TrueRig
 from simulators.conceal.rig_file import pose_record, rig_document, toml_text
-from simulators.defects import Scene
+from simulators.conceal.wanted import ConcealError
+from simulators.defects import Defect, Scene
 from simulators.defects.drive import WrongLoadCentre
 
 Floats = NDArray[np.float64]
@@ -37,6 +42,7 @@ def truth_document(case: Case) -> dict[str, Any]:
         "schema": 1,
         "wanted": asdict(case.wanted),
         "defects": [_defect(one) for one in case.hidden] + ([_convention(case)] if case.wanted.confused else []),
+        "constants": [_constant(name, case.off[name], enr) for name, enr in over_noise_of(case).items()],
         "withheld": list(case.withheld),
         "noise": {
             "kind": case.wanted.noise,
@@ -67,6 +73,16 @@ def _defect(one: HiddenMechanism) -> dict[str, Any]:
         "enr": one.enr,
         "enr_before_geometry": one.raw,
     }
+
+
+def _constant(name: str, by: float, enr: float) -> dict[str, Any]:
+    """A number of the arm by which it is off, as a cause."""
+    owner, _, what = name.partition(".")
+    zero = what == "zero"
+    unit = "m" if what in ("length", "offset") else "rad"
+    named = {"mechanism": f"{what}-off", "physics": "joint-zero-moved" if zero else "link-changed"}
+    named |= {"port": f"{owner}.angle" if zero else name, "drivers": [], "figures": {f"{what}_{unit}": by}}
+    return named | {"enr": enr}
 
 
 def _convention(case: Case) -> dict[str, Any]:
@@ -127,7 +143,7 @@ def _free_space(case: Case) -> dict[str, Any]:
             "beam_origin_m": origin_m.tolist(),
             "beam_direction": (tool[:, :3, :3] @ instrument.laser_direction).tolist(),
         }
-    return found | {"tip_m": tip_m(true, stance).tolist()}
+    return found | ({"tip_m": tip_m(true, stance).tolist()} if case.target is None else {})
 
 
 def at_start(scene: Scene, reading_rad: Floats, rng: np.random.Generator) -> Scene:
@@ -250,6 +266,10 @@ def columns(case: Case) -> dict[str, Column]:
             written |= one.defect.stated_columns(case.table.scene)
     for channel, name in enumerate(VALUES[case.wanted.family]):
         written[name] = case.values_m[:, channel].tolist()
+    if case.target is not None:
+        written["target"] = case.target.tolist()
+    if case.turn_rad is not None:
+        written |= {f"r{axis}_rad": said.tolist() for axis, said in zip("xyz", case.turn_rad.T, strict=True)}
     if case.second_rad is not None:
         written |= {f"enc{joint}_rad": said.tolist() for joint, said in enumerate(case.second_rad.T, start=1)}
     if case.exact.sum_v is not None:
@@ -258,3 +278,95 @@ def columns(case: Case) -> dict[str, Column]:
             if name not in case.withheld:
                 written[name] = noisy_v[:, sensor].tolist()
     return written
+
+
+FIELDS = {"length": "a_m", "offset": "d_m", "twist": "alpha_rad"}
+OFF = {"zero": 1e-3, "length": 1e-4, "offset": 1e-4, "twist": 2e-4}  # one sigma of a constant that is off, rad or m
+OFF_SHARE = 0.5  # of the constants
+PARALLEL = 1e-6  # 1 - cosine of two axes that a table of Denavit and Hartenberg cannot tilt against each other
+
+
+@dataclass(frozen=True)
+class Made:
+    """One of two sessions. `off`: constants as model.json names them, "joint3.zero", "link2.length"."""
+
+    off: Mapping[str, float]
+    defects: tuple[Defect, ...] = ()
+
+
+def made(case: Case, how: Made, seed: int) -> Case:
+    """The plan of `case` with the nominal arm but for what is `made` of it."""
+    true = _arm_off(case, how.off)
+    exact = observe(true, case.table.scene, how.defects, case.posture_rad)
+    reading_rad, values_m = add_noise(case.wanted, true, exact, case.sigma_m, np.random.default_rng(seed))
+    return replace(
+        case,
+        drawn=replace(case.drawn, true=true),
+        exact=exact,
+        reading_rad=reading_rad,
+        values_m=values_m,
+        rng=np.random.default_rng(seed + 1),
+        off=how.off,
+    )
+
+
+def pair_of(case: Case) -> tuple[Case, Case]:
+    """Measured: off by constants; simulated: with what is hidden. ConcealError where the rig file has no rows."""
+    if not case.drawn.drawing.rows:
+        raise ConcealError("constants are drawn for arms in the notation of Denavit and Hartenberg; take another seed")
+    rng = np.random.default_rng([case.wanted.seed, 51])
+    off = {name: OFF[name.partition(".")[2]] * rng.standard_normal() for name in _constants(case)}
+    measured = made(case, Made({k: by for k, by in off.items() if rng.random() < OFF_SHARE}), case.wanted.seed + 1)
+    return measured, made(case, Made({}, tuple(one.defect for one in case.hidden)), case.wanted.seed + 3)
+
+
+def _constants(case: Case) -> list[str]:
+    """Of all joints and of every link that both notations have."""
+    drawing = case.drawn.drawing
+    inner = range(1, drawing.n_joints if drawing.model == "mdh" else drawing.n_joints + 1)
+    names = [f"joint{joint}.zero" for joint in range(1, drawing.n_joints + 1)]
+    return names + [f"link{link}.{what}" for link in inner for what in FIELDS]
+
+
+def _arm_off(case: Case, off: Mapping[str, float]) -> TrueRig:
+    """The assumed rig with these constants changed."""
+    drawing, believed = case.drawn.drawing, case.drawn.believed
+    rows, zero_rad = list(drawing.rows), np.zeros(drawing.n_joints)
+    for name, by in off.items():
+        owner, _, what = name.partition(".")
+        row = int(owner[-1]) - 1
+        if what == "zero":
+            zero_rad[row] = by
+        else:
+            row += drawing.model == "mdh" and what != "offset"  # Craig's a and alpha come first
+            rows[row] = replace(rows[row], **{FIELDS[what]: getattr(rows[row], FIELDS[what]) + by})
+    fixed = fixed_parts(replace(drawing, rows=tuple(rows))) if off else believed.arm.fixed
+    return replace(believed, arm=replace(believed.arm, fixed=fixed, zero_rad=zero_rad))
+
+
+def over_noise_of(case: Case) -> dict[str, float]:
+    """Of each constant that is off: rms of what no other constant, tilt, tool or device can do, over the noise of two
+    recordings.
+    """
+    if not case.off:
+        return {}
+    names, believed = _constants(case), case.drawn.believed
+
+    def slope(ahead: TrueRig, behind: TrueRig) -> Floats:
+        one, two = (observe(rig, case.table.scene, (), case.posture_rad).values_m for rig in (ahead, behind))
+        return np.asarray((one - two).ravel() / (2.0 * STEP))
+
+    columns = [slope(_arm_off(case, {name: STEP}), _arm_off(case, {name: -STEP})) for name in names]
+    tilts = np.abs(believed.arm.fixed[:, 2, 2]) > 1.0 - PARALLEL
+    left_out = {f"link{k}.{axis}" for k, tilt in enumerate(tilts) for axis in range(6) if axis != 4 or not tilt}
+    others = [one for one in list_deviations(believed, case.drawn.spread) if one.name not in left_out]
+    columns += [slope(one.apply(believed, STEP), one.apply(believed, -STEP)) for one in others]
+    matrix = np.stack(columns, axis=1)
+    unit = matrix / (np.linalg.norm(matrix, axis=0) + np.finfo(float).tiny)
+
+    def over_noise(k: int, by: float) -> float:
+        rest = np.delete(unit, k, axis=1)
+        left = matrix[:, k] - rest @ np.linalg.lstsq(rest, matrix[:, k], rcond=1e-9)[0]
+        return float(abs(by) * np.sqrt(0.5 * np.mean(left**2)) / case.sigma_m)
+
+    return {name: over_noise(names.index(name), by) for name, by in case.off.items()}

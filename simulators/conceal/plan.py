@@ -61,6 +61,7 @@ def _lagged(drive: Floats, time_constant_s: float) -> Floats:
 
 REPEATED = 15
 COPIES = 3  # beside the first: groups of four
+FEW = 20  # samples of a session: below, no pose is repeated
 CYCLE_S = (6.0, 11.0)  # move, settle, read
 MOVE_S = 2.0  # every move takes the same time: a point-to-point program with fixed segment times
 
@@ -96,6 +97,7 @@ def timetable(
     habits: Habits,
     rng: np.random.Generator,
     linked: Whole | None = None,
+    repeated: int = REPEATED,
 ) -> Timetable:
     """Orders the poses (pose, n), each of which belongs to a fixture place (0: none), and adds repeats.
 
@@ -104,7 +106,7 @@ def timetable(
     group = np.zeros(len(pose_rad), dtype=np.int64)
     links = np.zeros(len(pose_rad), dtype=np.int64) if linked is None else linked
     loose = np.flatnonzero(links == 0)
-    chosen = rng.choice(loose, size=min(REPEATED, loose.size), replace=False)
+    chosen = rng.choice(loose, size=min(repeated, loose.size), replace=False)
     group[chosen] = np.arange(1, chosen.size + 1)
     taken = np.concatenate((np.arange(len(pose_rad)), np.repeat(chosen, COPIES)))
     stay = np.zeros(taken.size, dtype=np.int64) if habits.in_turns else _stays(place[taken], rng)
@@ -215,6 +217,9 @@ def draw_timetable(wanted: Wanted, true: TrueRig, habits: Habits, rng: np.random
         none = np.zeros_like(seat)
         return timetable(reading_rad, none, none, seat, habits, rng, linked)
     if not isinstance(instrument, DualPsd):
+        if wanted.samples < FEW:
+            few = np.zeros(wanted.samples, dtype=np.int64)
+            return timetable(free_poses(true.arm, few.size, rng), few, few, few, habits, rng, repeated=0)
         return timetable(free_poses(true.arm, poses, rng), none, none, none, habits, rng)
     each = [poses // wanted.places + (k < poses % wanted.places) for k in range(wanted.places)]
     taken = [shots(true, instrument, k + 1, number, CENTRED, rng) for k, number in enumerate(each)]

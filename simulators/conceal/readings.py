@@ -223,10 +223,19 @@ def length_m(rig: TrueRig, device: Device, scene: Scene, defects: Sequence[Defec
     return seen_m[:, np.newaxis]
 
 
-def _in_device(rig: TrueRig, device: Device, scene: Scene, defects: Sequence[Defect], stance: Stance) -> Floats:
+def flange_turn(device: Device, scene: Scene, defects: Sequence[Defect], stance: Stance) -> Floats:
+    """(row, 3, 3) the flange, with the tool's own motion, as the device has it in its axes."""
+    return np.asarray(_to_device(device, scene, defects)[:, :3, :3] @ stance.T_base_tool[:, :3, :3])
+
+
+def _to_device(device: Device, scene: Scene, defects: Sequence[Defect]) -> Floats:
     pose = np.broadcast_to(device.pose, (len(scene), 4, 4))
     for defect in defects:
         if isinstance(defect, MovesDevice):
             pose = pose @ defect.device_motion(scene)
-    back = inverse(pose)
+    return inverse(pose)
+
+
+def _in_device(rig: TrueRig, device: Device, scene: Scene, defects: Sequence[Defect], stance: Stance) -> Floats:
+    back = _to_device(device, scene, defects)
     return np.einsum("rij,rj->ri", back[:, :3, :3], tip_m(rig, stance)) + back[:, :3, 3]

@@ -91,6 +91,7 @@ class Belief:
     noise: Mapping[str, float]
     tolerance: Mapping[str, float]  # empty: the file has none
     encoder_side: str = ""  # of all second encoders, as the file states; empty: it does not
+    targets_m: Floats | None = None  # (target, 3) of several, as assumed
 
 
 def rig_document(belief: Belief) -> dict[str, Any]:
@@ -101,6 +102,8 @@ def rig_document(belief: Belief) -> dict[str, Any]:
         for joint in document["arm"]["joint"]:
             joint["encoder_side"] = belief.encoder_side
     document["tool"] = _tool(belief)
+    if belief.targets_m is not None:
+        document["target"] = [{"id": k, "point_m": point} for k, point in enumerate(belief.targets_m.tolist(), start=1)]
     instrument = belief.rig.instrument
     if isinstance(instrument, DualPsd):
         document["fixture"] = {
@@ -167,7 +170,7 @@ def _tool(belief: Belief) -> dict[str, Any]:
             "laser_origin_m": instrument.laser_origin_m.tolist(),
             "laser_direction": instrument.laser_direction.tolist(),
         }
-    return tool | {"point_m": belief.rig.tool_point_m.tolist()}
+    return tool if belief.targets_m is not None else tool | {"point_m": belief.rig.tool_point_m.tolist()}
 
 
 def pose_record(pose: Floats) -> dict[str, Any]:

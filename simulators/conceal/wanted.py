@@ -46,6 +46,7 @@ Family = Literal["dual-psd", "tracker", "cones", "wire"]
 FAMILIES: tuple[Family, ...] = get_args(Family)
 Side = Literal["link", "motor", "beside"]  # of second encoders: simulators/conceal/observe.py
 SIDES: tuple[Side, ...] = get_args(Side)
+Beside = Literal["too-much", "constants"]  # a simulation of the session: what it differs by
 INSTRUMENT = {"dual-psd": "dual-psd", "tracker": "position", "cones": "seat", "wire": "wire"}
 
 
@@ -70,3 +71,7 @@ class Wanted:
     side_stated: bool = False  # the rig file states on which side of the gear they sit
     confused: bool = False  # the rig file states the other of the two conventions of Denavit and Hartenberg
     thermometer_k: float = 0.0  # by which a room thermometer drifts; nothing depends on it. Not 0: it is recorded
+    at_least: float = 0.0  # effect over noise of each defect, or the seed is refused
+    targets: int = 1  # of a tracker, on the flange, read in turn
+    six_d: bool = False  # a tracker reads the orientation of its target, too
+    beside: Beside | None = None  # a simulation of the same plan is recorded, too; tracker, rig file in rows

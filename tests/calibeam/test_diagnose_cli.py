@@ -66,6 +66,19 @@ def test_a_file_in_degrees_is_told_written_and_ends_with_1(folder, tmp_path, cap
     assert str(wrong) in printed.err
 
 
+def test_of_too_few_rows_it_is_written_that_nothing_is_decided(folder, tmp_path, capsys):
+    few = tmp_path / "few"
+    few.mkdir()
+    (few / "rig.toml").write_text((folder / "rig.toml").read_text())
+    (few / "samples.csv").write_text("\n".join((folder / "samples.csv").read_text().splitlines()[:16]) + "\n")
+    path = tmp_path / "d.json"
+    assert run(["diagnose", str(few), "--out", str(path)]) == 0
+    said = json.loads(path.read_text())
+    assert (said["verdict"], said["findings"]) == ("undecidable", [])
+    assert "measure more poses" in " ".join(capsys.readouterr().out.split())
+    assert path.with_suffix(".html").is_file()
+
+
 def test_a_model_of_another_rig_is_refused(folder, tmp_path, capsys):
     other = tmp_path / "other"
     other.mkdir()

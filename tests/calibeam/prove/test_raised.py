@@ -4,11 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from calibeam.prove.raised import TROUBLES
 from calibeam.prove.scenario import Mix, Scenario, scenario
+from simulators.arm.kinematics import forward
 from simulators.conceal.case import Case, conceal
-from simulators.conceal.case_files import columns, truth_document
+from simulators.conceal.case_files import Made, columns, made, over_noise_of, pair_of, truth_document
 from simulators.conceal.rig_file import rig_document
 from simulators.conceal.wanted import ConcealError
 
@@ -20,7 +22,9 @@ def _drawn(trouble: str) -> tuple[Scenario, Case]:
     for attempt in range(20):
         one = scenario(mix, 2, 0, attempt)
         try:
-            return one, conceal(one.wanted)
+            case = conceal(one.wanted)
+            if one.wanted.beside is None or case.drawn.drawing.rows:
+                return one, case
         except ConcealError:
             continue
     raise AssertionError(f"{trouble}: no draw gave a session")
@@ -91,3 +95,65 @@ def test_a_recording_states_a_load_centre_that_is_elsewhere() -> None:
     stated_m = np.array([columns(case)[f"payload_com_{axis}_m"][0] for axis in "xyz"], dtype=np.float64)
     assert 0.08 <= float(np.linalg.norm(stated_m - case.table.scene.payload_com_m)) <= 0.2
     assert np.ptp(case.table.scene.payload_kg) > 0.0
+
+
+@pytest.mark.parametrize("trouble", ["simulation-has-too-much", "geometry-off"])
+def test_a_pair_is_of_one_plan_and_nothing_of_the_truth_is_in_it(trouble: str) -> None:
+    _, case = _drawn(trouble)
+    measured, simulated = pair_of(case)
+    np.testing.assert_array_equal(measured.reading_rad, simulated.reading_rad)
+    assert columns(measured).keys() == columns(simulated).keys()
+    assert rig_document(measured.belief) == rig_document(simulated.belief)
+    nominal = measured.drawn.believed.arm
+    np.testing.assert_array_equal(simulated.drawn.true.arm.fixed, nominal.fixed)
+    assert measured.off
+    assert not simulated.off
+
+
+def test_only_the_simulation_has_what_is_too_much() -> None:
+    _, case = _drawn("simulation-has-too-much")
+    measured, simulated = pair_of(case)
+    bare = made(case, Made({}), 1)
+    np.testing.assert_array_equal(made(case, Made(measured.off), 1).exact.values_m, measured.exact.values_m)
+    assert np.std(simulated.exact.values_m - bare.exact.values_m) > case.sigma_m
+
+
+def test_a_constant_counts_by_what_no_other_constant_can_do() -> None:
+    _, case = _drawn("geometry-off")
+    two = {"joint1.zero": 1e-3, "joint3.zero": 1e-3}
+    enr = over_noise_of(made(case, Made(two), 1))
+    assert enr["joint1.zero"] == pytest.approx(0.0, abs=1e-3)  # the device may stand elsewhere instead
+    assert enr["joint3.zero"] > 0.6
+    half = over_noise_of(made(case, Made({"joint3.zero": 5e-4}), 1))
+    assert half["joint3.zero"] == pytest.approx(0.5 * enr["joint3.zero"], rel=1e-6)
+
+
+def test_three_targets_are_read_in_turn_and_a_repeat_is_of_one() -> None:
+    _, case = _drawn("three-targets")
+    assert case.target is not None
+    np.testing.assert_array_equal(np.unique(case.target), [1, 2, 3])
+    for group in range(1, int(case.table.repeat.max()) + 1):
+        assert np.unique(case.target[case.table.repeat == group]).size == 1
+    document = rig_document(case.belief)
+    assert "point_m" not in document["tool"]
+    stated_m = np.array([one["point_m"] for one in document["target"]])
+    off_m = case.drawn.true.tool_point_m - stated_m[case.target - 1]
+    assert 0.0 < np.abs(off_m).max() < 5e-3
+
+
+def test_few_rows_are_few_and_their_cause_is_plain() -> None:
+    one, case = _drawn("few-rows")
+    assert 12 <= len(case.reading_rad) == one.wanted.samples < 20
+    assert not case.table.repeat.any()
+    assert case.hidden[0].enr >= one.wanted.at_least > 2.5
+
+
+def test_a_six_d_target_turns_with_the_flange() -> None:
+    _, case = _drawn("six-d-target")
+    assert case.turn_rad is not None
+    seen = Rotation.from_rotvec(case.turn_rad)
+    arm = case.drawn.true.arm
+    flange = Rotation.from_matrix(forward(arm, case.reading_rad + arm.zero_rad).flange[:, :3, :3])
+    steps = (seen[1:].inv() * seen[:-1]).magnitude(), (flange[1:].inv() * flange[:-1]).magnitude()
+    np.testing.assert_allclose(*steps, atol=2e-3)  # noise and the mechanism
+    assert {"rx_rad", "ry_rad", "rz_rad"} <= columns(case).keys()

@@ -6,12 +6,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from acquisition.recording.files import write_json
 from calibeam.prove.concealing import Concealed
 from calibeam.prove.diagnosing import Answered
 from calibeam.prove.record import CaseScore, Exact, FreeSpace, TrueDefect, TrueNoise, Truth
 from calibeam.prove.scenario import Scenario
 from calibeam.prove.scoring import score
 from calibeam.prove.seal import Layout
+from calibeam.results.comparison import ComparisonFile, DifferenceRecord
 from calibrate.diagnose.file import write_diagnosis
 from calibrate.diagnose.schema import (
     BlunderRecord,
@@ -22,7 +24,7 @@ from calibrate.diagnose.schema import (
     SizeRecord,
     UnexplainedRecord,
 )
-from simulators.conceal.wanted import Wanted
+from simulators.conceal.wanted import Beside, Wanted
 
 NAME = "case-0000"
 JOINT = """
@@ -61,6 +63,8 @@ def scored(tmp_path: Path) -> Scored:
         withheld: tuple[str, ...] = (),
         confused: bool = False,
         trouble: str = "",
+        beside: Beside | None = None,
+        differences: tuple[DifferenceRecord, ...] = (),
         **more: object,
     ) -> CaseScore:
         layout = Layout(tmp_path)
@@ -76,9 +80,15 @@ def scored(tmp_path: Path) -> Scored:
             **fields,  # type: ignore[arg-type]
         )
         write_diagnosis(layout.answer(NAME) / "diagnosis.json", file)
+        none: tuple[()] = ()
+        said = ComparisonFile(
+            1, "calibeam-comparison", "", "", "", 400, none, none, file.verdict, "", none, differences, none, none,
+            None, none, none, none, file,
+        )  # fmt: skip
+        write_json(layout.answer(NAME) / "compare.json", said)
         truth = Truth({}, defects, withheld, TrueNoise("white", NOISE_M, NOISE_M), Exact(exact), FreeSpace())
         kind = "withheld" if withheld else "one"
-        scenario = Scenario(NAME, kind, Wanted("tracker", seed=5000, confused=confused), trouble=trouble)
+        scenario = Scenario(NAME, kind, Wanted("tracker", seed=5000, confused=confused, beside=beside), trouble=trouble)
         concealed = Concealed(scenario, "", b"", 0)
         return score(layout, concealed, Answered(NAME, 1.0, ""), truth)
 
@@ -233,3 +243,47 @@ def test_of_a_raised_trouble_structure_without_a_name_at_its_place_is_located(
     spot = defect("psd-local-defect", "psd1.reading", drivers=("spot1",), figures={})
     assert scored((spot,), trouble="detector-local-defect", unexplained=left).defects[0].located
     assert not scored((spot,), unexplained=left).defects[0].located
+
+
+def _difference(level: str, where: str, physics: str, side: str = "", **sizes: SizeRecord) -> DifferenceRecord:
+    return DifferenceRecord(level, where, physics, sizes, side, True, 1e-4, "", (), {})
+
+
+@pytest.mark.parametrize("side", ["simulated", "measured", "both"])
+def test_what_the_simulation_has_too_much_is_located_on_its_side_only(
+    scored: Scored, defect: MakeDefect, side: str
+) -> None:
+    found = _finding("joint2.angle", "encoder-eccentricity", parameters={"amplitude_rad": SizeRecord(-1.05e-4, 4e-6)})
+    difference = _difference("effects", "joint2.angle", "encoder-eccentricity", side)
+    case = scored((defect(),), found, beside="too-much", differences=(difference,))
+    [one] = case.defects
+    mine = side == "simulated"
+    assert (one.located, one.named, case.misnamed) == (mine, mine, not mine)
+    assert [size.inside for size in one.sizes] == [True] * mine
+
+
+def test_constants_that_are_off_are_no_effect(scored: Scored, defect: MakeDefect) -> None:
+    zero = defect("joint-zero-moved", "joint3.angle", drivers=(), figures={"zero_rad": 1e-3})
+    link = defect("link-changed", "link2.length", drivers=(), figures={"length_m": 1e-4})
+    given = _difference("joint-zeros", "joint3.angle", "joint-zero-moved", zero_rad=SizeRecord(1.01e-3, 1e-5))
+    case = scored((zero, link), beside="constants", differences=(given,))
+    assert [(one.located, one.named) for one in case.defects] == [(True, True), (False, False)]
+    assert [size.inside for size in case.defects[0].sizes] == [True]
+    assert case.holds
+    effect = _finding("link2.angle", "link-bending")
+    also = _difference("effects", "link2.angle", "link-bending", "measured")
+    wrong = scored((zero, link), effect, beside="constants", differences=(given, also))
+    assert wrong.misnamed
+    assert not wrong.holds
+
+
+def test_few_rows_are_no_mismatch_without_their_cause(scored: Scored, defect: MakeDefect) -> None:
+    assert scored((defect(),), trouble="few-rows").holds
+    assert scored((defect(),), trouble="few-rows", verdict="undecidable").holds
+    assert scored((defect(),), _finding("joint2.angle", "backlash"), trouble="few-rows").holds
+    assert scored((defect(),), _finding("joint3.angle", "backlash"), trouble="few-rows").holds is False
+    assert scored((defect(),)).holds is None
+
+
+def test_a_replay_that_was_not_made_does_not_agree(scored: Scored, defect: MakeDefect) -> None:
+    assert scored((defect(),), trouble="three-targets").holds is False

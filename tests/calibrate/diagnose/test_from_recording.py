@@ -13,7 +13,6 @@ from calibrate.diagnose.fitted import fit_geometry
 from calibrate.diagnose.from_recording import diagnose_samples, runs_of
 from calibrate.diagnose.session import session_of
 from calibrate.diagnose.to_file import file_of
-from calibrate.errors import DataError
 from calibrate.physics.from_diagnosis import model_of_diagnosis
 from simulators.conceal.case import conceal
 from simulators.conceal.case_files import write_case
@@ -133,9 +132,13 @@ def test_gross_errors_here_and_there_are_no_run():
     assert [run.tolist() for run, _ in runs_of(np.array([3, 50, 51, 52, 53, 120]), 200)] == [[50, 51, 52, 53]]
 
 
-def test_a_handful_of_samples_is_refused(recording):
-    with pytest.raises(DataError, match="measure more poses"):
-        diagnose_samples(recording.rig, recording.samples.take(np.arange(15)), np.random.default_rng(1))
+def test_of_a_handful_of_samples_nothing_is_sought_and_nothing_claimed(recording):
+    few = diagnose_samples(recording.rig, recording.samples.take(np.arange(15)), np.random.default_rng(1))
+    assert few.physics is None
+    assert "measure more poses" in few.why_not
+    file = file_of(few, recording)
+    assert (file.verdict, file.findings) == ("undecidable", ())
+    assert [one.stage for one in file.incomplete] == ["search"]
 
 
 def test_an_instrument_may_have_all_its_rows_held_out(tmp_path):

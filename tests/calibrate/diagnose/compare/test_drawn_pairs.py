@@ -10,8 +10,9 @@ from calibeam.printing.comparison_lines import print_comparison
 from calibeam.results.comparison import compare
 from calibrate.diagnose.compare.beside import beside
 from calibrate.diagnose.compare.corrected import simulated_of
+from simulators.conceal.case_files import Made
 
-from .drawn_pairs import Made, case_of, pair_of
+from .drawn_pairs import case_of, pair_of
 
 MOST_LINES = 25
 SEEDS = (4, 5, 6, 7, 8, 10)  # of arms whose rig file has rows
