@@ -7,6 +7,7 @@ are the seals opened.
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
+from itertools import repeat
 from pathlib import Path
 
 import msgspec
@@ -78,7 +79,7 @@ def prove_loop(out: Path, cases: int, wired: int, seed: int, jobs: int, tell: Te
         errors: list[str] = []
         names = [one.scenario.name for one in concealed]
         with ThreadPoolExecutor(jobs) as pool:
-            for error in pool.map(lambda name: reconciled(layout, name, layout.answer(name)), names):
+            for error in pool.map(reconciled, repeat(layout), names, map(layout.answer, names)):
                 errors.append(error)
                 count(f"reconciled {len(errors)} of {total}")
         told = [_told(layout, one, error) for one, error in zip(concealed, errors, strict=True)]
