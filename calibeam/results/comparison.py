@@ -287,13 +287,14 @@ def _asked(
     diagnosed: bool,
 ) -> tuple[_Asked, Predictor, Pair]:
     """What a search gives, the simulation's geometry, and the pair as if set up alike."""
+    same = _same(pair)
     try:
         simulation = simulated_of(simulated.rig, pair[1])
         here = simulation.model
-        alike = set_alike(simulation, pair)
+        alike = pair if same else set_alike(simulation, pair)
     except (DataError, np.linalg.LinAlgError) as why:
         return _Asked(None, (), None, (), f"no reading to compare: {why}"), of_rig(simulated.rig), pair
-    if not diagnosed:
+    if not diagnosed or same:
         return _Asked(None, (), None, (), None), here, alike
     if len(pair[0]) < FEWEST:
         why = f"{len(pair[0])} samples are too few to explain a difference; {FEWEST} are needed"
@@ -316,6 +317,16 @@ def _asked(
     file = file_of(found.diagnosed, source)
     after = found.diagnosed.physics.model
     return _Asked(found, tuple(_readings(before, after, file)), file, tuple(_left(after)), None), here, alike
+
+
+def _same(pair: Pair) -> bool:
+    """Whether both are one recording: what a fit of their difference leaves is rounding, in which much can be seen."""
+    one, other = pair
+    if one.columns.keys() != other.columns.keys():
+        return False
+    return all(
+        np.allclose(one.column(n), other.column(n), rtol=0.0, atol=ROUNDING, equal_nan=True) for n in one.columns
+    )
 
 
 def _notes(asked: _Asked) -> Iterator[str]:

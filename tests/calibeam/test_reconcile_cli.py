@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 from acquisition.recording import read
 from acquisition.recording.rig import rig_text
 from calibeam.cli import run
+from calibeam.results.comparison import compare
 from calibeam.results.reconciliation import reconcile, split
 from tests.calibeam.test_compare_simulations import EXAMPLES, NOISE_M, TRACKER, arm, session
 
@@ -201,3 +202,8 @@ def test_geometry_alone_keeps_the_physics_that_the_simulation_has(tmp_path):
     (position,) = said["unseen"]
     assert position["before"] > 5.0
     assert position["geometry"] < 1.6  # both recordings scatter
+
+
+def test_a_session_of_several_targets_does_not_differ_from_itself(tmp_path):
+    recording = read(of_three_targets(tmp_path / "measured", poses()[:20]))
+    assert compare(recording, recording).verdict == "consistent"
