@@ -318,7 +318,7 @@ def _settled(fitted: Fitted, renewing: bool = False) -> Fitted:
 
     Of turns that differ in what they take noise for, the likeliest: no refit ends worse than it was. Derivatives may be
     kept from turn to turn, but the turn that ends it begins with those of its own values. `renewing`: with drivers as
-    every turn predicts them.
+    every turn predicts them, the last one as good as its own, which a likelier turn under others would not be.
     """
     best, resting = fitted, False
     for turn in range(1, TURNS):
@@ -329,7 +329,7 @@ def _settled(fitted: Fitted, renewing: bool = False) -> Fitted:
             problem = problem.refreshed(last.predicted if renewing else last.drivers)
         new = _turn(problem, fitted.active, fitted.values, fitted.noise, LAST if anew else TOLERANCE)
         fitted = replace(new, steps=fitted.steps + new.steps)
-        best = min(best, fitted, key=lambda fit: fit.minus_two_log_likelihood)
+        best = fitted if renewing else min(best, fitted, key=lambda fit: fit.minus_two_log_likelihood)
         gained = last.minus_two_log_likelihood - fitted.minus_two_log_likelihood
         least = SETTLED if new.stop in AT_REST else CREEPING
         resting = turn + 1 >= FEWEST_TURNS and abs(gained) < least
