@@ -26,17 +26,22 @@ from calibrate.diagnose.visible import VISIBLE
 from calibrate.effects.term import Term
 
 AT_ONCE = 4  # sure ones that are accepted before a refit
-PEERS = 8  # best entries that are looked at in turn for a plausible one
+PEERS = 8  # physics at a port that are looked at in turn for a plausible entry: ten thermometers are one growth
+LOOKED_AT = 32  # best entries, in all
 
 
 def admissible(
     bench: Bench, found: Scores, without: Removed | None, least: float, barred: frozenset[Key]
 ) -> Proposal | None:
     """The best proposal above a gain that is not barred and of a size that a machine could have."""
-    for proposal in islice(proposals(bench, found, without, least, barred), PEERS):
+    refused: set[tuple[str, str]] = set()
+    for proposal in islice(proposals(bench, found, without, least, barred), LOOKED_AT):
         accepted = proposal.accepted
         if accepted.term.plausible(accepted.coefficients, accepted.inner, bench.noise_rad):
             return proposal
+        refused.add((accepted.term.port.where, accepted.term.physics))
+        if len(refused) == PEERS:
+            break
     return None
 
 
