@@ -7,6 +7,7 @@ in docs/formats.md.
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 import msgspec
 import numpy as np
@@ -324,9 +325,13 @@ def _same(pair: Pair) -> bool:
     one, other = pair
     if one.columns.keys() != other.columns.keys():
         return False
-    return all(
-        np.allclose(one.column(n), other.column(n), rtol=0.0, atol=ROUNDING, equal_nan=True) for n in one.columns
-    )
+    return all(_same_column(values, other.columns[name]) for name, values in one.columns.items())
+
+
+def _same_column(one: NDArray[Any], other: NDArray[Any]) -> bool:
+    if one.dtype.kind == other.dtype.kind == "f":
+        return np.allclose(one, other, rtol=0.0, atol=ROUNDING, equal_nan=True)
+    return np.array_equal(one, other)
 
 
 def _notes(asked: _Asked) -> Iterator[str]:
