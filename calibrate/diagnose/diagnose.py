@@ -10,6 +10,7 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
+from calibrate.diagnose.bench import recent_menu
 from calibrate.diagnose.diagnosis import Diagnosis, Finding, Named, Rejected, RivalName
 from calibrate.diagnose.doubt import Doubted, doubted
 from calibrate.diagnose.drifts import parted_by_time
@@ -52,7 +53,7 @@ def diagnose(
     samples = np.unique(at.state.rows.sample[at.state.rows.data])
     wanders = attempt(Stage.NOISE, lambda: _wanders(at, rng), otherwise=False)
     rejected, invisible = attempt(Stage.REJECTED, lambda: _not_there(at), ((), ()))
-    return replace(
+    whole = replace(
         _without_proof(found, missing),
         proofs=attempt(Stage.PROOFS, lambda: proofs(state, at.state, samples, rng), ()),
         floors=attempt(Stage.FLOORS, lambda: floors(at.state, samples, at.state.rows.geometry.shape[1]), ()),
@@ -61,6 +62,8 @@ def diagnose(
         invisible=invisible,
         incomplete=stages.failed,
     )
+    recent_menu.cache_clear()
+    return whole
 
 
 def _without_proof(found: Doubted, missing: Sequence[Missing]) -> Diagnosis:

@@ -27,7 +27,7 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from calibrate.diagnose.bench import Bench, recent_menu
+from calibrate.diagnose.bench import Bench
 from calibrate.diagnose.diagnosis import UNKNOWN, Finding, Unexplained, Verdict
 from calibrate.diagnose.drifts import suspects
 from calibrate.diagnose.drifts import untold as drift_untold
@@ -103,7 +103,8 @@ def doubted(
         known(Doubted(at, bare_findings(at), (), None, (), undecided=True))
     nameless = tuple(() for _ in few.state.accepted)
     few, rivals = stages.attempt(Stage.ALTERNATIVES, lambda: _named_best(few), (few, nameless))
-    at = _renewed(at if at.keys == few.keys else _of_all(few, state))
+    whole = at if at.keys == few.keys else _of_all(few, state)
+    at = stages.attempt(Stage.ALTERNATIVES, lambda: _renewed(whole), whole)
     scatter = stages.attempt(Stage.SCATTER, lambda: unrecorded(at.bench, rng, missing), None)
     misfit = stages.attempt(Stage.REPEATS, lambda: lack_of_fit(at.bench), None)
     lasting = stages.attempt(Stage.TIME, lambda: time_left(at.bench, rng), None)
@@ -125,7 +126,6 @@ def doubted(
     if left and not lacking:
         lacking = list(missing)
     unexplained = (*left, *(drift_untold(f, hidden) for f, hidden in drifts))
-    recent_menu.cache_clear()
     return Doubted(at, findings, unexplained, misfit, records(lacking), stages.undecided)
 
 

@@ -9,7 +9,7 @@ import pytest
 from acquisition.recording import read
 from calibeam.results.diagnosis import diagnose_to_file
 from calibrate.diagnose import doubt, from_recording
-from calibrate.diagnose.bench import Bench
+from calibrate.diagnose.bench import Bench, recent_menu
 from calibrate.diagnose.diagnose import diagnose
 from calibrate.diagnose.diagnosis import Verdict
 from calibrate.diagnose.port_process import processes
@@ -70,6 +70,15 @@ def test_causes_are_known_before_sizes_and_stay_when_everything_after_them_fails
     assert failed == {Stage.ALTERNATIVES, Stage.SCATTER, Stage.REPEATS, Stage.SIZES, Stage.PROOFS}
     assert [f.name for f in early[0].findings] == [f.name for f in said.findings]
     assert {one.reason for one in early[0].incomplete} == {NOT_YET}
+
+
+def test_causes_stay_when_the_last_refit_fails(world, monkeypatch):
+    monkeypatch.setattr("tests.calibrate.diagnose.conftest.LinearSession.renewed", broken)
+    rng = np.random.default_rng(3)
+    said = diagnose(effect(world, rng), rng)
+    assert [(f.name.where, f.name.physics) for f in said.findings] == [("joint2.angle", "encoder-eccentricity")]
+    assert [one.stage for one in said.incomplete] == [Stage.ALTERNATIVES]
+    assert recent_menu.cache_info().currsize == 0  # nothing of a session outlives its diagnosis
 
 
 def test_a_session_that_could_not_be_searched_is_not_consistent(world, monkeypatch):
