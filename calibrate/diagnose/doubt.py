@@ -49,6 +49,7 @@ from calibrate.effects.term import Missing
 
 SPEED = "qd"
 MOTION = ("approach", "last_move")
+LOADS = ("payload", "gravity_torque")
 SEVERAL = 3  # joints: one clock is simpler than slack in each
 
 # Of BIC: no more than a bare mention. Source: Kass, Raftery, Bayes factors, J. Am. Stat. Assoc. 90(430), 1995, section
@@ -116,8 +117,9 @@ def doubted(
     drifting = {i: hidden for i, a in enumerate(at.state.accepted) if (hidden := suspects(named(a.term), missing))}
     would = {scatter.port.where} if scatter is not None and scatter.missing else set[str]()
     untold = {*drifting, *lagging, *(i for i, a in enumerate(at.state.accepted) if a.term.port.where in would)}
+    weighed = not any(m.driver in LOADS for m in missing)
     findings = stages.attempt(
-        Stage.SIZES, lambda: findings_of(at, rivals, predicts(at.bench), final, untold), bare_findings(at)
+        Stage.SIZES, lambda: findings_of(at, rivals, predicts(at.bench), final, untold, weighed), bare_findings(at)
     )
     where = {at.state.accepted[i].term.port.where: hidden for i, hidden in drifting.items()}
     drifts = [(f, where[f.name.where]) for f in findings if f.name.where in where and f.name.physics == UNKNOWN]

@@ -10,6 +10,7 @@ coefficients are shared out between it, its neighbours and geometry as priors pl
 What only the curve explains is one: felt at the readings, divided by how they feel the port.
 """
 
+import re
 from collections.abc import Collection, Sequence
 from dataclasses import replace
 
@@ -35,6 +36,10 @@ ALIKE = 1e-6  # sine between what two names can make of the readings
 FAINT = 0.05  # a name that is less likely is none
 SIGMAS = 3.0  # of a size, for a name
 NO_SIZE = ("phase", "time", "period", "degree", "order")  # words of parameters for where or when, not how much
+WEIGHTS = ("gravity_torque", "overturning_moment")
+# Of the greatest cause by weight: less may be what an unknown load, or the weight of a link itself, adds to that one.
+MISWEIGHED = 0.2
+ANGLE = re.compile(r"q\d+")
 LEFTOVER = 0.1  # of what an unknown cause explains: a curve may leave so much of a law that it only resembles
 
 SEVERAL = 3  # two may share a joint
@@ -52,12 +57,13 @@ def findings_of(
     predicts: Floats,
     final: bool = True,
     untold: Collection[int] = (),
+    weighed: bool = True,
 ) -> tuple[Finding, ...]:
     """Largest first. `rivals` of each term; `predicts` (term,) as `calibrate/diagnose/doubt.py` gives it.
 
     All that is unknown at one port is one finding. `final`: no structure is left without a name; while some is, no
     name of physics is more likely than not. `untold`: terms that a column which was not recorded would explain; their
-    names are alternatives only.
+    names are alternatives only. `weighed`: all that the arm carries is stated and recorded.
     """
     accepted = at.state.accepted
     unnamed = _unnamed(at)
@@ -65,7 +71,10 @@ def findings_of(
     closed = [i for i in range(len(accepted)) if i not in taken]
     names = [_finding(at, i, rivals[i], float(predicts[i])) for i in closed]
     unknown = [unknown_cause(at, group, predicts) for group in unnamed]
-    names = [f if final and _final(f, unknown) else f.believed(NOT_FINAL) for f in names]
+    loads = 0.0 if weighed else max((f.share for f in names if _by_weight(f.name)), default=0.0)
+    slight = [_by_weight(f.name) and f.share < MISWEIGHED * loads for f in names]
+    doubtful = [less or not (final and _final(f, unknown)) for f, less in zip(names, slight, strict=True)]
+    names = [f.believed(NOT_FINAL) if less else f for f, less in zip(names, doubtful, strict=True)]
     sure = [i not in untold and f.confidence >= FAINT and _sized(f) for i, f in zip(closed, names, strict=True)]
     names = [f if ok else _unsure(at, i, f, predicts) for i, f, ok in zip(closed, names, sure, strict=True)]
     explained = max(sum(f.share for f in (*names, *unknown)), 1e-300)
@@ -129,8 +138,17 @@ def _final(finding: Finding, unknown: Sequence[Finding]) -> bool:
 
     A cause that is in no catalogue need not act through one port only.
     """
-    drivers = set(finding.name.depends_on)
-    return not any(finding.share < LEFTOVER * u.share or drivers <= set(u.name.depends_on) for u in unknown)
+    return not any(finding.share < LEFTOVER * u.share or _within(finding.name, u.name) for u in unknown)
+
+
+def _within(name: Named, unknown: Named) -> bool:
+    """Whether an unknown cause may hold a name's drivers: weight is a function of the angles of the joints."""
+    by_angles = name.where == unknown.where and all(ANGLE.fullmatch(driver) for driver in unknown.depends_on)
+    return set(name.depends_on) <= set(unknown.depends_on) or (by_angles and _by_weight(name))
+
+
+def _by_weight(name: Named) -> bool:
+    return any(driver.startswith(WEIGHTS) for driver in name.depends_on)
 
 
 def _finding(at: Search, i: int, rivals: Sequence[Rival], predicts: float) -> Finding:

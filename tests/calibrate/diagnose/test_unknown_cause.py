@@ -18,7 +18,9 @@ from calibrate.diagnose.searching import holds
 from calibrate.diagnose.unknown import cancel, with_unknowns
 from calibrate.effects.form import Form
 from calibrate.effects.ports import Place, Port
-from calibrate.effects.term import Shape
+from calibrate.effects.term import Missing, Shape
+
+from .conftest import Plain
 
 SIZE_RAD = 1.5
 
@@ -224,3 +226,55 @@ def test_a_name_on_the_driver_of_an_unknown_cause_is_not_final(world):
     beside = [f for f in said if f.name.physics == "encoder-eccentricity"]
     assert beside
     assert all(f.confidence <= 0.5 for f in beside)
+
+
+def weighed(joint):
+    port = Port(f"joint{joint}.angle", Place.JOINTS)
+    return Plain(port, (f"gravity_torque{joint}",), Shape.LINEAR, "joint-compliance", joint=joint - 1)
+
+
+@pytest.fixture
+def without_masses(monkeypatch):
+    """The linear sessions have no rig to compute a torque, its sigma or a payload's lever from."""
+    monkeypatch.setattr("calibrate.diagnose.doubt.unrecorded", lambda bench, rng, missing: None)
+    monkeypatch.setattr("calibrate.diagnose.findings.sizes_of", lambda bench, i: {})
+    monkeypatch.setattr(
+        "calibrate.diagnose.pulled_back.likely_torque_nm", lambda d, joint: d.extra[f"gravity_torque{joint}"]
+    )
+
+
+def two_soft_joints(world):
+    rng = np.random.default_rng(3)
+    torque = {f"gravity_torque{i}": rng.normal(size=world.samples) for i in (2, 4)}
+    truth = [(world.at_joint(i, lambda d, i=i: torque[f"gravity_torque{i}"]), enr) for i, enr in ((2, 6.0), (4, 1.5))]
+    session = world.session(rng, truth, extra=torque)
+    return replace(session, terms=(*session.terms, weighed(2), weighed(4))), rng
+
+
+@pytest.mark.parametrize(
+    ("lacking", "sure"),
+    [
+        ((), {"joint2.angle", "joint4.angle"}),
+        ((Missing("payload", "payload_kg", "payload-compliance"),), {"joint2.angle"}),
+        ((Missing("gravity_torque", "mass_kg", "joint-compliance"),), {"joint2.angle"}),
+    ],
+)
+def test_beside_a_great_cause_by_weight_a_slight_one_is_final_only_if_all_weights_are_known(
+    world, without_masses, lacking, sure
+):
+    session, rng = two_soft_joints(world)
+    said = doubted(session, rng, lacking).findings
+    assert {f.name.where for f in said if f.name.physics == "joint-compliance"} == {"joint2.angle", "joint4.angle"}
+    assert {f.name.where for f in said if f.confidence > 0.5} == sure
+
+
+def test_a_weight_is_a_function_of_the_angles_of_an_unknown_cause_at_its_joint(world, without_masses):
+    """The load that turns a joint may be one that is not recorded."""
+    rng = np.random.default_rng(3)
+    torque = {"gravity_torque2": rng.normal(size=world.samples)}
+    truth = [(world.at_joint(2, lambda d: np.tanh(3.0 * d.q_rad[:, 0] * d.q_rad[:, 2])), 4.0)]
+    truth.append((world.at_joint(2, lambda d: torque["gravity_torque2"]), 4.0))
+    session = world.session(rng, truth, extra=torque)
+    said = doubted(replace(session, terms=(*session.terms, weighed(2))), rng).findings
+    assert {f.name.physics for f in said} == {"unknown", "joint-compliance"}
+    assert all(f.confidence <= 0.5 for f in said if f.name.physics == "joint-compliance")
