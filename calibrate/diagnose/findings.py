@@ -36,10 +36,11 @@ ALIKE = 1e-6  # sine between what two names can make of the readings
 FAINT = 0.05  # a name that is less likely is none
 SIGMAS = 3.0  # of a size, for a name
 NO_SIZE = ("phase", "time", "period", "degree", "order")  # words of parameters for where or when, not how much
-WEIGHTS = ("gravity_torque", "overturning_moment")
+WEIGHTS = ("gravity_torque", "overturning_moment", "payload")
 # Of the greatest cause by weight: less may be what an unknown load, or the weight of a link itself, adds to that one.
+# Where all weights are stated they are off by a fifth at most, its square at the port itself.
 MISWEIGHED = 0.2
-ANGLE = re.compile(r"q\d+")
+OF_ANGLES = re.compile(r"(q|gravity_torque)\d+")
 LEFTOVER = 0.1  # of what an unknown cause explains: a curve may leave so much of a law that it only resembles
 
 SEVERAL = 3  # two may share a joint
@@ -71,8 +72,8 @@ def findings_of(
     closed = [i for i in range(len(accepted)) if i not in taken]
     names = [_finding(at, i, rivals[i], float(predicts[i])) for i in closed]
     unknown = [unknown_cause(at, group, predicts) for group in unnamed]
-    loads = 0.0 if weighed else max((f.share for f in names if _by_weight(f.name)), default=0.0)
-    slight = [_by_weight(f.name) and f.share < MISWEIGHED * loads for f in names]
+    loads = [f for f in names if _by_weight(f.name)]
+    slight = [any(_misweighed(f, load, weighed) for load in loads) for f in names]
     doubtful = [less or not (final and _final(f, unknown)) for f, less in zip(names, slight, strict=True)]
     names = [f.believed(NOT_FINAL) if less else f for f, less in zip(names, doubtful, strict=True)]
     sure = [i not in untold and f.confidence >= FAINT and _sized(f) for i, f in zip(closed, names, strict=True)]
@@ -143,8 +144,15 @@ def _final(finding: Finding, unknown: Sequence[Finding]) -> bool:
 
 def _within(name: Named, unknown: Named) -> bool:
     """Whether an unknown cause may hold a name's drivers: weight is a function of the angles of the joints."""
-    by_angles = name.where == unknown.where and all(ANGLE.fullmatch(driver) for driver in unknown.depends_on)
+    by_angles = name.where == unknown.where and all(OF_ANGLES.fullmatch(driver) for driver in unknown.depends_on)
     return set(name.depends_on) <= set(unknown.depends_on) or (by_angles and _by_weight(name))
+
+
+def _misweighed(finding: Finding, load: Finding, weighed: bool) -> bool:
+    """Whether a cause may be what the weights behind a greater one are off by."""
+    here = finding.name.where == load.name.where and all(OF_ANGLES.fullmatch(name) for name in finding.name.depends_on)
+    unknown = not weighed and _by_weight(finding.name) and finding.share < MISWEIGHED * load.share
+    return unknown or (here and finding.share < MISWEIGHED**2 * load.share)
 
 
 def _by_weight(name: Named) -> bool:

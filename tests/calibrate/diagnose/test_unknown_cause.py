@@ -278,3 +278,15 @@ def test_a_weight_is_a_function_of_the_angles_of_an_unknown_cause_at_its_joint(w
     said = doubted(replace(session, terms=(*session.terms, weighed(2))), rng).findings
     assert {f.name.physics for f in said} == {"unknown", "joint-compliance"}
     assert all(f.confidence <= 0.5 for f in said if f.name.physics == "joint-compliance")
+
+
+def test_a_slight_law_of_the_angle_beside_a_great_cause_by_weight_is_no_final_name(world, without_masses):
+    """Weights are never stated exactly."""
+    rng = np.random.default_rng(3)
+    torque = {"gravity_torque2": rng.normal(size=world.samples)}
+    truth = [(world.at_joint(2, lambda d: torque["gravity_torque2"]), 9.0)]
+    truth += [(world.at_joint(joint, lambda d, i=joint: np.sin(d.q_rad[:, i - 1])), 1.2) for joint in (2, 3)]
+    session = world.session(rng, truth, extra=torque)
+    said = doubted(replace(session, terms=(*session.terms, weighed(2))), rng).findings
+    sure = {f.name.where: f.confidence > 0.5 for f in said if f.name.physics == "encoder-eccentricity"}
+    assert sure == {"joint2.angle": False, "joint3.angle": True}
