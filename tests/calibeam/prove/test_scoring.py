@@ -245,6 +245,16 @@ def test_of_a_raised_trouble_structure_without_a_name_at_its_place_is_located(
     assert not scored((spot,), unexplained=left).defects[0].located
 
 
+@pytest.mark.parametrize(("rows", "located"), [((76, 77, 79), True), ((76, 77, 90), False), ((), False)])
+def test_a_few_rows_that_stood_elsewhere_locate_a_shift_of_their_time(
+    scored: Scored, defect: MakeDefect, rows: tuple[int, ...], located: bool
+) -> None:
+    shift = defect("base-moved", "base.pose", drivers=("t",), figures={"at_s": 70.0, "until_s": 80.0})
+    left = UnexplainedRecord("", "time", 1e-5, 0.5, 1e-4, "rows 76 to 79 stood elsewhere")
+    shots = tuple(BlunderRecord("bad shot", (row,), "x_m", "far away") for row in rows)
+    assert scored((shift,), unexplained=left, blunders=shots).defects[0].located is located
+
+
 def _difference(level: str, where: str, physics: str, side: str = "", **sizes: SizeRecord) -> DifferenceRecord:
     return DifferenceRecord(level, where, physics, sizes, side, True, 1e-4, "", (), {})
 
