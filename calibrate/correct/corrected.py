@@ -17,10 +17,11 @@ from scipy.spatial.transform import Rotation
 from acquisition.recording import Samples
 from acquisition.recording.rig import parse_rig
 from calibrate.arms.rig_arm import RigArm
+from calibrate.correct.mounting import Mounting, mounting
 from calibrate.errors import DataError
 from calibrate.model_file import ModelFile
 from calibrate.physics.applied import BY_JOINT
-from calibrate.physics.predicting import POSTURES, SEED, flange_with_physics, mean_motion, placed
+from calibrate.physics.predicting import flange_with_physics, placed
 from calibrate.predict import Predictor
 from calibrate.rigid import inverse
 
@@ -34,6 +35,7 @@ CLOSE = 1e-9  # m and rad: far below what any arm repeats
 MOVED_RAD = 1e-4  # a joint that went less far has not moved, as in effects/conditions.py
 RANGE_SLACK = 1e-9  # of the recorded range: rounding
 OK, LIMIT, UNREACHABLE, OUTSIDE, SINGULAR = "ok", "limit", "unreachable", "outside", "singular"
+UNMEASURED = 0.5  # of the predicted error: from here on the tool's own uncertainty is what limits it
 SINGULAR_GAIN = 10.0  # joints of a regular posture turn about as far as the tool is off: 1
 SINGULAR_RAD = np.radians(0.5)  # a joint that turns less does so unseen
 
@@ -87,6 +89,7 @@ class ToolErrors:
     error_rad: Floats
     s_error_m: Floats
     s_error_rad: Floats
+    shift_m: Floats  # (pose, 3) wanted less real, along the axes of the base
 
     @property
     def rms_m(self) -> float:
@@ -148,6 +151,8 @@ def correct(
     told[good] = arms.drawn.frames(q_rad[good])[:, -1] @ arms.stated_tool
     if via_rad is not None:
         via_rad = np.where(good[:, None], via_rad, np.nan)
+    if options.tool is not None:
+        notes = (*notes, *arms.of_tool(after))
     if arms.low_rad is None:
         notes = (*notes, "the model does not hold its recorded joint range: poses beyond it are not marked")
     return Corrected(q_rad, nominal_rad, via_rad, told, before, after, status, says, notes)
@@ -160,6 +165,7 @@ class Arms:
     model: ModelFile
     drawn: RigArm
     geometric: RigArm
+    flange: Mounting
     stated_tool: Floats  # (4, 4) in the flange
     real_tool: Floats
     low_rad: Floats | None  # (joint,) recorded range; None: the model does not hold it
@@ -174,21 +180,40 @@ class Arms:
         joints = [held.get(f"q{j + 1}_rad") for j in range(rig.n_joints)]
         table = np.array([j for j in joints if j], dtype=np.float64)
         whole = len(table) == rig.n_joints
-        # Which frame of the last link is its flange no instrument shows: the one that lies best on the drawn one.
-        postures = np.random.default_rng(SEED).uniform(drawn.lower_rad, drawn.upper_rad, (POSTURES, drawn.n_joints))
-        mounted = mean_motion(geometric.frames(postures)[:, -1], drawn.frames(postures)[:, -1])
+        flange = mounting(predictor, drawn, geometric)
         if options.tool is not None:
-            stated, real = options.tool, mounted @ options.tool
+            stated, real = options.tool, flange.T @ options.tool
         else:
-            stated, real = np.eye(4), mounted.copy()
+            stated, real = np.eye(4), flange.T.copy()
             stated[:3, 3] = drawn.point_m
             real[:3, 3] = predictor.tip_at(np.eye(4)[None])[0]
         low, high = (table.min(axis=1), table.max(axis=1)) if whole else (None, None)
-        return cls(model, drawn, geometric, stated, real, low, high)
+        return cls(model, drawn, geometric, flange, stated, real, low, high)
 
     @property
     def n_joints(self) -> int:
         return self.drawn.n_joints
+
+    @property
+    def s_tool_m(self) -> float:
+        """One sigma of where the stated tool is, for want of knowing how the flange lies."""
+        return self.flange.sigma_m(self.stated_tool[:3, 3])
+
+    def of_tool(self, after: ToolErrors) -> tuple[str, ...]:
+        """A sentence where a stated tool is worth less than the corrected arm."""
+        sigma_m, lever_m = self.s_tool_m, self.flange.lever_m(self.stated_tool[:3, 3])
+        if sigma_m <= after.rms_m * UNMEASURED:
+            return ()
+        far = (
+            f"lies {1e3 * lever_m:.0f} mm from the nearest measured point"
+            if np.isfinite(lever_m)
+            else "is not measured"
+        )
+        return (
+            f"the tool {far}, and how the flange is turned is known to ± {1e3 * self.flange.sigma_rad:.1g} mrad only: "
+            f"± {1e6 * sigma_m:.2g} µm of the predicted error; teach this tool again on the robot, or measure three "
+            "points of it as [[target]] in one session",
+        )
 
 
 def predicted_errors(
@@ -196,26 +221,26 @@ def predicted_errors(
 ) -> tuple[ToolErrors, tuple[str, ...], tuple[str, ...]]:
     """Of the real tool at commands (pose, joint); names of drivers of each row beyond their recorded range; notes."""
     n, arms = len(q_rad), Arms.of(model, options)
-    values, beyond = np.full((4, n), np.nan), [""] * n
+    values, off_m, beyond = np.full((4, n), np.nan), np.full((n, 3), np.nan), [""] * n
     rows = np.flatnonzero(np.isfinite(q_rad).all(axis=1))
     if rows.size == 0:
-        return ToolErrors(*values), tuple(beyond), ()
-    samples = _samples(q_rad[rows], {name: v[rows] for name, v in conditions.items()})
+        return ToolErrors(*values, off_m), tuple(beyond), ()
+    samples = as_samples(q_rad[rows], {name: v[rows] for name, v in conditions.items()})
     point_m = None if options.tool is None else arms.real_tool[:3, 3]
     known = placed(model, samples, point_m=point_m, own_flange=True)
     off = wanted.T_base_tool[rows] @ inverse(known.T_base_flange @ arms.real_tool)
     turn = Rotation.from_matrix(off[:, :3, :3]).magnitude()
     there_m = (known.T_base_flange @ arms.real_tool)[:, :3, 3]
-    shift = wanted.T_base_tool[rows, :3, 3] - there_m
+    off_m[rows] = shift = wanted.T_base_tool[rows, :3, 3] - there_m
     values[:, rows] = (
         np.linalg.norm(shift, axis=1),
         turn,
-        np.linalg.norm(known.tip_sigma_m, axis=1),
-        np.linalg.norm(known.flange_sigma[:, 3:], axis=1),
+        np.hypot(np.linalg.norm(known.tip_sigma_m, axis=1), 0.0 if point_m is None else arms.s_tool_m),
+        np.hypot(np.linalg.norm(known.flange_sigma[:, 3:], axis=1), arms.flange.sigma_rad),
     )
     for row, names in zip(rows.tolist(), known.outside, strict=True):
         beyond[row] = names
-    return ToolErrors(*values), tuple(beyond), known.notes
+    return ToolErrors(*values, off_m), tuple(beyond), known.notes
 
 
 def _nominal(arms: Arms, wanted: Wanted, inverse_of: Inverse) -> tuple[Floats, dict[int, tuple[str, str]]]:
@@ -285,7 +310,7 @@ def _solved(
     q_rad, best_rad = start_rad, start_rad.copy()
     least, found = np.full(len(goal), np.inf), np.zeros(len(goal), dtype=bool)
     for _ in range(ROUNDS):
-        real = flange_with_physics(arms.model, _samples(q_rad, conditions))[0]
+        real = flange_with_physics(arms.model, as_samples(q_rad, conditions))[0]
         off = inverse(real) @ goal
         left = np.maximum(np.linalg.norm(off[:, :3, 3], axis=1), Rotation.from_matrix(off[:, :3, :3]).magnitude())
         better = found & (left < least)
@@ -299,7 +324,7 @@ def _solved(
     return best_rad, found & np.isfinite(least)
 
 
-def _samples(q_rad: Floats, conditions: Mapping[str, Floats]) -> Samples:
+def as_samples(q_rad: Floats, conditions: Mapping[str, Floats]) -> Samples:
     """Rows of joints under conditions. The clock is of no matter: what is true of one session only is left out."""
     n, joints = q_rad.shape
     columns = {"t_s": np.arange(n, dtype=np.float64)} | {f"q{j + 1}_rad": q_rad[:, j] for j in range(joints)}
