@@ -1,6 +1,7 @@
 """`calibeam correct`: joint commands and corrected programs that bring the real tool where it is wanted."""
 
-from dataclasses import dataclass
+import re
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -17,8 +18,9 @@ from calibeam.outcome import PartialResult
 from calibeam.overwriting import writes
 from calibrate.arms.rig_arm import RigArm
 from calibrate.correct.corrected import Corrected, Options, Wanted, correct
+from calibrate.correct.frames import measured_frame
 from calibrate.correct.programs.rewriting import correct_program, dialect_of
-from calibrate.correct.tables import corrected_rows, read_poses
+from calibrate.correct.tables import corrected_rows, read_points, read_poses
 from calibrate.errors import DataError
 from calibrate.model_file import ModelFile, read_model
 from calibrate.physics.applied import conditions_of_effects
@@ -27,6 +29,9 @@ Floats = NDArray[np.float64]
 
 LARGEST_BYTES = 4_000_000  # a program of 20,000 targets
 LONGEST = 10_000  # letters of a line; controllers end at some hundred
+KRL_PAIR = (".src", ".dat")
+LINE = re.compile(r"\bline (\d+)")
+FRAMES_LIMIT = 1.25  # of the predicted error: from here on frames that were taught before are what limits it
 LISTED = 12  # poses that are not ok, before the rest is counted
 SIDES = {"positive": 1, "negative": -1}
 UM = 1e6
@@ -44,7 +49,9 @@ def correct_command(
     overshoot_deg: Annotated[float, Parameter(validator=validators.Number(gt=0.0, lte=20.0))] = 2.0,
     margin_deg: Annotated[float, Parameter(validator=validators.Number(gte=0.0))] = 1.0,
     tool: tuple[float, float, float, float, float, float] | None = None,
-    frame: tuple[float, float, float, float, float, float] | None = None,
+    frame: Annotated[tuple[str, ...], Parameter(show_default=False, consume_multiple=True)] = (),
+    points: Path | None = None,
+    joint_targets: bool = False,
     start: Annotated[tuple[float, ...], Parameter(show_default=False)] = (),
     condition: Annotated[tuple[str, ...], Parameter(show_default=False)] = (),
     verbose: bool = False,
@@ -67,8 +74,8 @@ def correct_command(
     model
         The model.json of a diagnosis or an identification; its rig file is what the controller computes with.
     poses
-        poses.csv, or a program (.script, .src, .dat, .mod, .prg, .ls); joint targets of a program are taken as poses of
-        the rig file's arm.
+        poses.csv, or a program (.script, .src, .dat, .mod, .prg, .ls); of KRL both files, .src and .dat, are taken
+        where they stand side by side.
     out
         The file to write; never the input itself.
     approach
@@ -81,7 +88,13 @@ def correct_command(
         Tool centre point in the flange as the controller has it: x y z in m, rotation vector in rad; it is taken to be
         exact. Default: the program's; else the rig file's point for the controller, the model's for the real tool.
     frame
-        Frame of the poses in the base, x y z in m, rotation vector in rad, where the program does not hold it.
+        Frame of the poses in the base, where the program does not hold it: x y z in m, rotation vector in rad; or its
+        name, with --points.
+    points
+        Table (.csv) of three or more points of the frame that the tool touched: x_m, y_m, z_m in the frame, q1_rad ...
+        as read. The frame is fitted to them, and has to be entered into the controller.
+    joint_targets
+        Correct joint targets, too, as poses of the rig file's arm; without it they stay as they are.
     start
         Joint angles in degrees before the first pose; the nearest posture is taken. Default: middle of the range.
     condition
@@ -92,15 +105,17 @@ def correct_command(
     """
     if out.resolve() == poses.resolve():
         raise DataError(f"{out}: this is the input; give another --out")
-    job = _Job.of(model, start, condition, frame)
     options = Options(
         None if tool is None else _pose(tool),
         0 if approach is None else SIDES[approach],
         float(np.radians(overshoot_deg)),
         float(np.radians(margin_deg)),
+        joint_targets,
     )
     console = Console(soft_wrap=True, highlight=False)
-    found, names, notes = (
+    job = _Job.of(model, start, condition)
+    job = replace(job, frame=_frame(console, job, frame, points, options))
+    found, names, frames, left, notes = (
         _table(job, poses, out, options)
         if poses.suffix.lower() == ".csv"
         else _program(console, job, poses, out, options, verbose)
@@ -110,11 +125,12 @@ def correct_command(
         for c in job.every
         if c not in conditions_of_effects(job.known)
     )
-    _print_found(console, job.known, found, names, (*needless, *notes, *found.notes), verbose)
+    _print_found(console, job.known, found, names, frames, left, (*needless, *notes, *found.notes), verbose)
     console.print(f"corrected: {out}", markup=False)
-    lost = int(np.sum(~np.isfinite(found.q_rad).all(axis=1)))
+    lost = int(np.sum(~np.isfinite(found.q_rad).all(axis=1))) + left
     if lost:
-        raise PartialResult(f"{lost} of {len(names)} poses have no command; they are named above and in {out}")
+        count = len(names) + left
+        raise PartialResult(f"{count - lost} of {count} corrected; {lost} left as they were, named above")
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,9 +145,7 @@ class _Job:
     solver: MotionInverse
 
     @classmethod
-    def of(
-        cls, model: Path, start: tuple[float, ...], condition: tuple[str, ...], frame: tuple[float, ...] | None
-    ) -> "_Job":
+    def of(cls, model: Path, start: tuple[float, ...], condition: tuple[str, ...]) -> "_Job":
         known = read_model(model)
         if known.rig.text is None:
             raise DataError(f"{model}: the rig's text is not in the file; identify again")
@@ -139,11 +153,38 @@ class _Job:
         if start and len(start) != rig.n_joints:
             raise DataError(f"--start has {len(start)} angles, the arm {rig.n_joints} joints")
         near_rad = np.radians(start) if start else None
-        place = None if frame is None else _pose(frame)
-        return cls(known, rig.n_joints, near_rad, _conditions(condition), place, MotionInverse(RigArm.of_rig(rig)))
+        return cls(known, rig.n_joints, near_rad, _conditions(condition), None, MotionInverse(RigArm.of_rig(rig)))
 
 
-def _table(job: _Job, poses: Path, out: Path, options: Options) -> tuple[Corrected, list[str], tuple[str, ...]]:
+Done = tuple[Corrected, list[str], Floats, int, tuple[str, ...]]  # names, frames, how many are left alone, notes
+
+
+def _frame(console: Console, job: _Job, given: tuple[str, ...], points: Path | None, options: Options) -> Floats | None:
+    """(4, 4) as stated, or as fitted to touched points, which is printed."""
+    if points is None:
+        if not given:
+            return None
+        try:
+            x, y, z, rx, ry, rz = map(float, given)
+        except ValueError:
+            raise DataError(f"--frame {' '.join(given)}: six numbers, or a name together with --points") from None
+        return _pose((x, y, z, rx, ry, rz))
+    if len(given) != 1:
+        raise DataError(f"--points {points}: give the name of the frame that they lie in: --frame NAME")
+    in_frame_m, q_rad = read_points(_text(points, "utf-8"), str(points), job.n_joints)
+    every = {c: np.full(len(q_rad), v) for c, v in job.every.items()}
+    found = measured_frame(job.known, in_frame_m, q_rad, every, options)
+    place = [*found.T_base_frame[:3, 3], *Rotation.from_matrix(found.T_base_frame[:3, :3]).as_rotvec()]
+    shift_um, turn_urad = UM * np.linalg.norm(found.sigma[:3]), UM * np.linalg.norm(found.sigma[3:])
+    console.print(
+        f"frame {given[0]}: {' '.join(f'{v:.6f}' for v in place)} (m, rotation vector in rad) ± {shift_um:.2g} µm, "
+        f"± {turn_urad:.2g} µrad; {len(q_rad)} points, {UM * found.rms_m:.2g} µm rms: enter it into the controller",
+        markup=False,
+    )
+    return found.T_base_frame
+
+
+def _table(job: _Job, poses: Path, out: Path, options: Options) -> Done:
     place = np.eye(4) if job.frame is None else job.frame
     wanted = _begun(read_poses(_text(poses, "utf-8"), str(poses), job.n_joints, place, job.every), job.near_rad)
     found = correct(job.known, wanted, job.solver, options)
@@ -154,23 +195,49 @@ def _table(job: _Job, poses: Path, out: Path, options: Options) -> tuple[Correct
         for c in wanted.conditions
         if c not in conditions_of_effects(job.known) and c not in job.every
     )
-    return found, [f"pose {row + 1}" for row in range(len(wanted))], given
+    names = [f"pose {row + 1}" for row in range(len(wanted))]
+    return found, names, np.broadcast_to(place, (len(names), 4, 4)), 0, given
 
 
-def _program(
-    console: Console, job: _Job, poses: Path, out: Path, options: Options, verbose: bool
-) -> tuple[Corrected, list[str], tuple[str, ...]]:
+def _program(console: Console, job: _Job, poses: Path, out: Path, options: Options, verbose: bool) -> Done:
     dialect = dialect_of(poses.suffix)
     if dialect is None:
         raise DataError(f"{poses}: neither a table (.csv) nor a program (.script, .src, .dat, .mod, .prg, .ls)")
-    text = _text(poses, "latin-1")  # every byte has a letter, so that all of them are kept
+    files, outs = _with_partner(poses, out)
+    texts = [_text(path, "latin-1") for path in files]  # every byte has a letter, so that all of them are kept
     done = correct_program(
-        job.known, text, dialect, job.frame, job.near_rad, job.every, job.solver, options, poses.name
+        job.known, "".join(texts), dialect, job.frame, job.near_rad, job.every, job.solver, options, poses.name
     )
-    write_output(out, done.text.encode("latin-1"), CORRECTED_PROGRAM)
-    names = list(done.names)
+    ends = [len(done.text)] if len(files) == 1 else [done.placed(len(texts[0])), len(done.text)]
+    for path, begin, end in zip(outs, (0, *ends), ends, strict=False):
+        write_output(path, done.text[begin:end].encode("latin-1"), CORRECTED_PROGRAM)
+    lines = texts[0].count("\n")
+
+    def of_file(sentence: str) -> str:
+        """Lines of the second file are counted from its own beginning."""
+        return LINE.sub(
+            lambda m: m[0] if int(m[1]) <= lines or len(files) == 1 else f"{files[1].name} line {int(m[1]) - lines}",
+            sentence,
+        )
+
+    names = [of_file(name) for name in done.names]
     _print_program(console, done.diff, done.found, names, verbose)
-    return done.found, names, done.skipped
+    notes = [of_file(sentence) for sentence in (*done.skipped, *done.seams)]
+    if done.kept:
+        notes.append(f"{len(done.kept)} joint targets kept as they are ({', '.join(done.kept[:3])}): --joint-targets")
+    return done.found, names, done.frames, len(done.skipped), tuple(notes)
+
+
+def _with_partner(poses: Path, out: Path) -> tuple[list[Path], list[Path]]:
+    """A KRL program and its data list, in this order, and where they go; of other programs the one file."""
+    beside = {path.suffix.lower(): path for path in poses.parent.iterdir() if path.stem == poses.stem}
+    files = [beside[end] for end in KRL_PAIR if end in beside]
+    if poses.suffix.lower() not in KRL_PAIR or len(files) < len(KRL_PAIR):
+        return [poses], [out]
+    outs = [out.with_suffix(path.suffix) for path in files]
+    if same := next((path for path in outs if path.resolve() in [one.resolve() for one in files]), None):
+        raise DataError(f"{same}: this is the input; give another folder or name with --out")
+    return files, outs
 
 
 def _begun(wanted: Wanted, near_rad: Floats | None) -> Wanted:
@@ -200,7 +267,14 @@ def _error(error_m: float, sigma_m: float) -> str:
 
 
 def _print_found(
-    console: Console, model: ModelFile, found: Corrected, names: list[str], notes: tuple[str, ...], verbose: bool
+    console: Console,
+    model: ModelFile,
+    found: Corrected,
+    names: list[str],
+    frames: Floats,
+    left: int,
+    notes: tuple[str, ...],
+    verbose: bool,
 ) -> None:
     commanded = int(np.sum(np.isfinite(found.q_rad).all(axis=1)))
 
@@ -211,7 +285,14 @@ def _print_found(
         f"; predicted tool error, uncertainty included, rms: "
         f"{UM * found.before.rms_m:.0f} µm before, {UM * found.after.rms_m:.1f} µm after"
     )
-    say(f"{commanded} of {len(names)} poses corrected{rms if commanded else ''}")
+    say(f"{commanded} of {len(names) + left} poses corrected{rms if commanded else ''}")
+    as_they_are = found.frames_as_they_are(frames)
+    if commanded and as_they_are > FRAMES_LIMIT * found.after.rms_m:
+        after = f"{UM * found.after.rms_m:.1f} µm holds with these"
+        say(
+            f"measure bases and work objects again with the corrected arm (--frame NAME --points): {after}; those "
+            f"taught before hold the old errors, and leave about {UM * as_they_are:.0f} µm"
+        )
     if (far_mm := 1e3 * np.nanmax(found.before.error_m, initial=0.0)) > 10.0:  # seldom is geometry off by more
         remedy = "check the mastering, and the tool of the poses: [tool] point_m of the rig file, or --tool"
         say(f"CHECK BEFORE YOU RUN IT: corrections of up to {far_mm:.0f} mm; {remedy}")

@@ -24,6 +24,7 @@ from calibrate.physics.applied import BY_JOINT
 from calibrate.physics.predicting import flange_with_physics, placed
 from calibrate.predict import Predictor
 from calibrate.rigid import inverse
+from calibrate.sensors.target import point_by_twist
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -35,6 +36,8 @@ CLOSE = 1e-9  # m and rad: far below what any arm repeats
 MOVED_RAD = 1e-4  # a joint that went less far has not moved, as in effects/conditions.py
 RANGE_SLACK = 1e-9  # of the recorded range: rounding
 OK, LIMIT, UNREACHABLE, OUTSIDE, SINGULAR = "ok", "limit", "unreachable", "outside", "singular"
+SAME = 9  # decimals to which frames of one program are the same
+TURNED = 3  # poses of a frame: fewer show no turn of it
 UNMEASURED = 0.5  # of the predicted error: from here on the tool's own uncertainty is what limits it
 SINGULAR_GAIN = 10.0  # joints of a regular posture turn about as far as the tool is off: 1
 SINGULAR_RAD = np.radians(0.5)  # a joint that turns less does so unseen
@@ -79,6 +82,7 @@ class Options:
     approach: int = 0
     overshoot_rad: float = np.radians(2.0)
     margin_rad: float = np.radians(1.0)  # to a limit of a joint: nearer is reported
+    joint_targets: bool = False  # those of a program, too, as poses of the rig file's arm
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,6 +116,13 @@ class Corrected:
     status: tuple[str, ...]
     says: tuple[str, ...]  # why, where the status is not ok
     notes: tuple[str, ...]
+
+    def frames_as_they_are(self, frames: Floats) -> float:
+        """Rms of the error that is to be expected (m) where the frames (pose, 4, 4) of the poses were taught with the
+        uncorrected arm: each holds the rigid motion that lies best on that arm's errors at its poses.
+        """
+        held_m = taken_up(frames, self.T_base_tool[:, :3, 3], self.before.shift_m)
+        return float(np.hypot(self.after.rms_m, np.sqrt(np.nanmean(held_m**2)))) if np.isfinite(held_m).any() else 0.0
 
 
 def correct(
@@ -224,7 +235,7 @@ def predicted_errors(
     values, off_m, beyond = np.full((4, n), np.nan), np.full((n, 3), np.nan), [""] * n
     rows = np.flatnonzero(np.isfinite(q_rad).all(axis=1))
     if rows.size == 0:
-        return ToolErrors(*values, off_m), tuple(beyond), ()
+        return ToolErrors(values[0], values[1], values[2], values[3], off_m), tuple(beyond), ()
     samples = as_samples(q_rad[rows], {name: v[rows] for name, v in conditions.items()})
     point_m = None if options.tool is None else arms.real_tool[:3, 3]
     known = placed(model, samples, point_m=point_m, own_flange=True)
@@ -240,7 +251,7 @@ def predicted_errors(
     )
     for row, names in zip(rows.tolist(), known.outside, strict=True):
         beyond[row] = names
-    return ToolErrors(*values, off_m), tuple(beyond), known.notes
+    return ToolErrors(values[0], values[1], values[2], values[3], off_m), tuple(beyond), known.notes
 
 
 def _nominal(arms: Arms, wanted: Wanted, inverse_of: Inverse) -> tuple[Floats, dict[int, tuple[str, str]]]:
@@ -322,6 +333,21 @@ def _solved(
         q_rad = np.where(solved[:, None], next_rad, q_rad)
         found |= solved
     return best_rad, found & np.isfinite(least)
+
+
+def taken_up(frames: Floats, goal_m: Floats, shift_m: Floats) -> Floats:
+    """(pose,) m that frames (pose, 4, 4) hold of shifts (pose, 3), wanted less reached, at their poses (pose, 3)."""
+    keys = np.unique(np.round(frames, SAME).reshape(len(frames), -1), axis=0, return_inverse=True)[1].ravel()
+    out = np.full(len(goal_m), np.nan)
+    for key in np.unique(keys):
+        rows = np.flatnonzero((keys == key) & np.isfinite(shift_m).all(axis=1))
+        if len(rows) == 0:
+            continue
+        twist = point_by_twist(goal_m[rows] - goal_m[rows].mean(axis=0)).reshape(-1, 6)
+        by = twist if len(rows) >= TURNED else twist[:, :3]
+        rigid = by @ np.linalg.lstsq(by, shift_m[rows].ravel(), rcond=1e-6)[0]
+        out[rows] = np.linalg.norm(rigid.reshape(-1, 3), axis=1)
+    return out
 
 
 def as_samples(q_rad: Floats, conditions: Mapping[str, Floats]) -> Samples:

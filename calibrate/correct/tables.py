@@ -53,6 +53,20 @@ def read_poses(text: str, name: str, n_joints: int, frame: Floats, every: Mappin
     )
 
 
+def read_points(text: str, name: str, n_joints: int) -> tuple[Floats, Floats]:
+    """(point, 3) in their frame and (point, joint) readings at which the tool touched them. DataError as above."""
+    table = _table(text, name)
+    joints = [f"q{j + 1}_rad" for j in range(n_joints)]
+    missing = [c for c in joints if c not in table]
+    if missing or not len(table[joints[0]]):
+        lacking = ", ".join(missing) or "rows"
+        raise DataError(f"{name}: {lacking} missing; a touched point has x_m, y_m, z_m and q1_rad ...")
+    return (
+        np.stack([_column(table, axis, LENGTHS, name) for axis in "xyz"], axis=1),
+        np.stack([_column(table, f"q{j + 1}", {"_rad": 1.0}, name) for j in range(n_joints)], axis=1),
+    )
+
+
 def corrected_rows(found: Corrected, frame: Floats) -> tuple[list[str], list[list[str]]]:
     """Header and rows of corrected.csv; overshoot points stand before the pose that they belong to."""
     joints = [f"q{j + 1}_rad" for j in range(found.q_rad.shape[1])]

@@ -24,7 +24,8 @@ from calibrate.correct.rotations import FANUC
 POSITION = re.compile(r"P\[\s*(?P<number>\d+)[^\]]*\]\s*\{(?P<body>[^}]*)\}")
 FIELD = re.compile(rf"\b(?P<key>X|Y|Z|W|P|R|J[1-9])\s*=\s*(?P<number>{NUMBER})\s*(?P<unit>mm|deg)")
 FRAMES = (("user frame", re.compile(r"UF\s*:\s*(?P<n>\w+)")), ("tool frame", re.compile(r"UT\s*:\s*(?P<n>\w+)")))
-MOVE = re.compile(r"^[ \t]*\d*:\s*(?:J|L|(?P<arc>[CA]))\s+(?P<target>P(?:R)?\[\s*\d+)", re.MULTILINE)
+# The end of an arc of C stands in a line of its own.
+MOVE = re.compile(r"^[ \t]*(?:\d*:\s*[JLCA]|:)\s+(?P<target>P(?:R)?\[\s*\d+)", re.MULTILINE)
 POSE = ("X", "Y", "Z", "W", "P", "R")
 
 
@@ -36,9 +37,8 @@ def find(text: str, n_joints: int) -> Targets:
     skipped: list[str] = []
     for match in MOVE.finditer(text, 0, body):
         target = re.sub(r"\s", "", match["target"])
-        if target.startswith("PR[") or match["arc"]:
-            what = "circular moves" if match["arc"] else "position registers"
-            skipped.append(f"line {line_of(text, match.end())}: {what} are not corrected")
+        if target.startswith("PR["):
+            skipped.append(f"line {line_of(text, match.end())}: position registers are not corrected")
             continue
         by_number.setdefault(target[2:], []).append(
             instruction(text, match.start(), lambda at: (NamedPose(), NamedPose()))

@@ -6,7 +6,7 @@ targets of PTP, LIN, SPTP and SLIN and declared points; tools, bases and relativ
 
 import re
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,14 +19,23 @@ Floats = NDArray[np.float64]
 
 AGGREGATE = r"\{(?:\s*(?:E6POS|E6AXIS|POS|AXIS|FRAME)\s*:)?(?P<fields>[^{}\[\]]*)\}"
 FIELD = re.compile(rf"\b(?P<key>[A-Z]\w*)\s+(?P<number>{literal.NUMBER}|'B[01]+')", re.IGNORECASE)
-INLINE = re.compile(rf"^[ \t]*S?(?:PTP|LIN)\s+{AGGREGATE}", re.IGNORECASE | re.MULTILINE)
+NAME = r"[A-Za-z_]\w*(?:\[[^\]]*\])?"
+INLINE = re.compile(rf"^[ \t]*S?(?:PTP|LIN|CIRC)\s+{AGGREGATE}", re.IGNORECASE | re.MULTILINE)
+# An arc has two targets: the auxiliary point, and its end.
+ARC = r"^[ \t]*S?CIRC\s+(?:" + NAME + r"|\{[^{}]*\})\s*,\s*"
+INLINE_END = re.compile(ARC + AGGREGATE, re.IGNORECASE | re.MULTILINE)
+ARRAY = re.compile(r"\b(?:E6POS|E6AXIS|POS|AXIS)\s+(?P<name>\w+)\s*\[", re.IGNORECASE)
+ELEMENT = re.compile(
+    rf"^[ \t]*(?P<name>(?P<array>\w+)\s*\[\s*\d+\s*\])\s*=\s*{AGGREGATE}", re.IGNORECASE | re.MULTILINE
+)
 DECLARED = re.compile(
     rf"^[ \t]*(?:DECL\s+)?(?:GLOBAL\s+)?(?:CONST\s+)?(?:E6POS|E6AXIS|POS|AXIS)\s+(?P<name>\w+)\s*=\s*{AGGREGATE}",
     re.IGNORECASE | re.MULTILINE,
 )
-MOVE = re.compile(r"^[ \t]*S?(?:PTP|LIN|CIRC)\s+(?P<target>[A-Za-z_]\w*)", re.IGNORECASE | re.MULTILINE)
-OTHER = re.compile(r"^[ \t]*S?(?:CIRC|PTP_REL|LIN_REL|CIRC_REL)\b", re.IGNORECASE | re.MULTILINE)
-ROUTINE = re.compile(r"^[ \t]*(?:GLOBAL\s+)?DEF(?:FCT)?\b", re.IGNORECASE | re.MULTILINE)
+MOVE = re.compile(rf"^[ \t]*S?(?:PTP|LIN|CIRC)\s+(?P<target>{NAME})", re.IGNORECASE | re.MULTILINE)
+ARC_END = re.compile(rf"{ARC}(?P<target>{NAME})", re.IGNORECASE | re.MULTILINE)
+OTHER = re.compile(r"^[ \t]*S?(?:PTP_REL|LIN_REL|CIRC_REL)\b", re.IGNORECASE | re.MULTILINE)
+ROUTINE = re.compile(r"^[ \t]*(?:GLOBAL\s+)?DEF(?:FCT\s+\w+)?\s+(?P<routine>\w+)\s*\(", re.IGNORECASE | re.MULTILINE)
 SET = re.compile(
     r"\$(?P<what>BASE|TOOL)(?:\.\w+)?\s*=\s*(?P<value>[^\n]*)|\bBAS\s*\(\s*#(?P<kind>BASE|TOOL)\s*,\s*(?P<number>\w+)\s*\)"
     r"|\bFDAT_ACT\s*=\s*(?P<inline>\w+)",
@@ -35,6 +44,7 @@ SET = re.compile(
 HELD = re.compile(rf"(?<!\w)(?P<name>\$?\w+(?:[ \t]*\[[ \t]*\d+[ \t]*\])?)\s*=\s*{AGGREGATE}", re.IGNORECASE)
 INLINE_DATA = re.compile(r"\bFDAT\s+(?P<name>\w+)\s*=\s*\{(?P<fields>[^{}]*)\}", re.IGNORECASE)
 FIXED = re.compile(r"\$IPO_MODE\s*=\s*#TCP|IPO_FRAME\s+#TCP", re.IGNORECASE)
+Used = tuple[literal.NamedPose, literal.NamedPose]  # base and tool
 POSE = ("X", "Y", "Z", "A", "B", "C")
 
 
@@ -42,26 +52,26 @@ def find(text: str, n_joints: int) -> literal.Targets:
     """Of .src and of .dat."""
     code = literal.blanked(text, ";")
     places, inline_data = _places(code)
-    by_name = literal.moves_of(text, code, MOVE, places)
+    by_name = literal.moves_of(text, code, (MOVE, ARC_END), places)
+    arrays = {match["name"].lower() for match in ARRAY.finditer(code)}
+    elements = (match for match in ELEMENT.finditer(code) if match["array"].lower() in arrays)
     literals: list[literal.Literal] = []
     skipped: list[str] = []
-    for match in (*INLINE.finditer(code), *DECLARED.finditer(code)):
-        inline = match.re is INLINE
+    for match in (*INLINE.finditer(code), *INLINE_END.finditer(code), *DECLARED.finditer(code), *elements):
+        inline = match.re in (INLINE, INLINE_END)
         if inline:
             moves = (literal.instruction(text, match.start(), places),)
             name = f"line {literal.line_of(text, match.start('fields'))}"
         else:
             name = match["name"]
-            moves = tuple(by_name.get(name.lower(), ()))
+            moves = literal.moves_to(by_name, name)
         own = None if inline else inline_data.get("F" + name.upper().removeprefix("X"))
         one = _literal(text, match, name, moves, n_joints, own)
         if one is None:
             skipped.append(f"{name}: an aggregate that does not state the whole target is not corrected")
         else:
             literals.append(one)
-    others = (
-        (m.end(), f"{m.group().strip()}: circular and relative moves are not corrected") for m in OTHER.finditer(code)
-    )
+    others = ((m.end(), f"{m.group().strip()}: relative moves are not corrected") for m in OTHER.finditer(code))
     skipped += literal.sentences(text, by_name, literals, others)
     return literal.Targets(tuple(sorted(literals, key=lambda one: one.at)), tuple(skipped))
 
@@ -139,21 +149,46 @@ def _places(code: str) -> tuple[literal.Places, dict[str, tuple[literal.NamedPos
         base, tool = (place(what, f"{what}_DATA[{numbers.get(what + '_NO')}]") for what in ("BASE", "TOOL"))
         inline[match["name"].upper()] = (base, tool)
 
-    nothing = (literal.NamedPose(refused=fixed), literal.NamedPose(refused=fixed))
-    states, base, tool = list[tuple[literal.NamedPose, literal.NamedPose]](), *nothing
-    for event in events:
-        if event.re is ROUTINE:
-            base, tool = nothing
-        elif event["inline"]:
-            unknown = (literal.NamedPose(f"FDAT {event['inline']}", None, fixed),) * 2
-            base, tool = inline.get(event["inline"].upper(), unknown)
-        else:
-            what = (event["what"] or event["kind"]).upper()
-            pose = place(what, event["value"] or f"{what}_DATA[{event['number']}]")
-            base, tool = (pose, tool) if what == "BASE" else (base, pose)
-        states.append((base, tool))
+    nothing: Used = (literal.NamedPose(refused=fixed), literal.NamedPose(refused=fixed))
     starts = [event.start() for event in events]
-    return lambda at: literal.last_before(states, starts, at, nothing), inline
+
+    def states(entered: Mapping[str, Used]) -> list[Used]:
+        """After each event, where routines begin with what they are entered with."""
+        out, (base, tool) = list[Used](), nothing
+        for event in events:
+            if event.re is ROUTINE:
+                base, tool = entered.get(event["routine"].lower(), nothing)
+            elif event["inline"]:
+                unknown = (literal.NamedPose(f"FDAT {event['inline']}", None, fixed),) * 2
+                base, tool = inline.get(event["inline"].upper(), unknown)
+            else:
+                what = (event["what"] or event["kind"]).upper()
+                pose = place(what, event["value"] or f"{what}_DATA[{event['number']}]")
+                base, tool = (pose, tool) if what == "BASE" else (base, pose)
+            out.append((base, tool))
+        return out
+
+    alone = states({})
+    entered = {
+        event["routine"].lower(): uses[0]
+        for event in events
+        if event.re is ROUTINE
+        and (uses := [literal.last_before(alone, starts, at, nothing) for at in _calls(code, event["routine"])])
+        and all(_alike(use, uses[0]) for use in uses)
+    }
+    known = states(entered)
+    return lambda at: literal.last_before(known, starts, at, nothing), inline
+
+
+def _calls(code: str, routine: str) -> list[int]:
+    """Where a routine of the file is called."""
+    call = re.compile(rf"(?<![\w$]){routine}\s*\(", re.IGNORECASE)
+    begun = {match.start("routine") for match in ROUTINE.finditer(code)}
+    return [match.start() for match in call.finditer(code) if match.start() not in begun]
+
+
+def _alike(one: Used, other: Used) -> bool:
+    return all(a.name == b.name and np.array_equal(a.T, b.T) for a, b in zip(one, other, strict=True))
 
 
 def _key(name: str) -> str:

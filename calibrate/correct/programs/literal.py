@@ -10,6 +10,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from acquisition.recording.files import shown
 from calibrate.correct.corrected import Branch
 from calibrate.correct.rotations import RotationForm, pose
 from calibrate.errors import DataError
@@ -22,6 +23,7 @@ UNIT = 1e-2  # by which the length of a quaternion may differ from 1: rounding o
 EDGE_RAD = 1e-3  # across the edge of a quarter turn, or of the sign of an axis, an angle may be by rounding of its pose
 
 NUMBER = r"[-+]?(?:\d++(?:\.\d*+)?|\.\d++)(?:[eE][-+]?\d++)?"  # no number is tried again, digit by digit
+ELEMENT = re.compile(r"(\w+)[\[{](.*)[\]}]")  # of an array: its name and index
 LONGEST_MOVE = 500  # letters that are read of an instruction; with a target in it one has some 200
 
 
@@ -44,6 +46,7 @@ class Move:
     tool: NamedPose = NamedPose()
 
 
+Moves = dict[str, list[Move]]  # by the key of their target
 Places = Callable[[int], tuple[NamedPose, NamedPose]]  # where an instruction begins -> its frame and tool
 Turns = Callable[[Floats], list[tuple[Span, str]]]  # joint angles (joint,) -> its configuration, where that changes
 
@@ -122,6 +125,17 @@ def fixed(value: float, digits: int) -> str:
     return text.removeprefix("-") if float(text) == 0.0 else text
 
 
+def unread(text: str, code: str, pattern: re.Pattern[str], literals: Sequence[Literal]) -> list[tuple[int, str]]:
+    """Targets as the pattern writes them that are in no literal: what is not corrected is at least listed."""
+    spans = sorted(span for one in literals for span in one.spans)
+    begins = [begin for begin, _ in spans]
+    return [
+        (match.start(), f"a target that no move of this file is seen to go to is left as it is: {shown(match.group())}")
+        for match in pattern.finditer(code)
+        if bisect_left(begins, match.start()) == bisect_left(begins, match.end())
+    ]
+
+
 def line_of(text: str, at: int) -> int:
     return bisect_left(_line_ends(text), at) + 1
 
@@ -159,23 +173,45 @@ def instruction(text: str, at: int, places: Places, end: str = "\n") -> Move:
     return Move(start, text[start : at + LONGEST_MOVE if stop < 0 else stop + len(end.strip())], *places(at))
 
 
-def moves_of(text: str, code: str, pattern: re.Pattern[str], places: Places, end: str = "\n") -> dict[str, list[Move]]:
-    """By what an instruction moves to, the group `target` of the pattern."""
-    found: dict[str, list[Move]] = {}
-    for match in pattern.finditer(code):
-        found.setdefault(match["target"].lower(), []).append(instruction(text, match.start(), places, end))
+def moves_of(text: str, code: str, patterns: Sequence[re.Pattern[str]], places: Places, end: str = "\n") -> Moves:
+    """By what an instruction moves to, the group `target` of a pattern."""
+    found: Moves = {}
+    for match in (m for pattern in patterns for m in pattern.finditer(code)):
+        found.setdefault(key(match["target"]), []).append(instruction(text, match.start(), places, end))
     return found
 
 
+def key(target: str) -> str:
+    """A name as programs compare it."""
+    return re.sub(r"\s", "", target).lower()
+
+
+def moves_to(by_name: Moves, name: str) -> tuple[Move, ...]:
+    """Instructions that go to a target, or, of an array, to an element that only its index at run time chooses."""
+    found = list(by_name.get(key(name), ()))
+    if (element := ELEMENT.fullmatch(key(name))) is not None:
+        found += [
+            move
+            for target, moves in by_name.items()
+            if (other := ELEMENT.fullmatch(target)) and other[1] == element[1] and not other[2].isdigit()
+            for move in moves
+        ]
+    return tuple(found)
+
+
 def sentences(
-    text: str, by_name: dict[str, list[Move]], literals: Sequence[Literal], others: Iterable[tuple[int, str]]
+    text: str, by_name: Moves, literals: Sequence[Literal], others: Iterable[tuple[int, str]]
 ) -> tuple[str, ...]:
     """On moves whose target is not among the literals, and on `others`: where they stand, and why."""
-    known = {one.name.lower() for one in literals}
+    known = {key(one.name) for one in literals}
+    arrays = {element[1] for name in known if (element := ELEMENT.fullmatch(name))}
+    known |= {t for t in by_name if (e := ELEMENT.fullmatch(t)) and e[1] in arrays and not e[2].isdigit()}
     elsewhere = [
         (move.line_start, f"{' '.join(move.text.split())}: its target is no literal of this file")
         for target, moves in by_name.items()
         if target not in known
         for move in moves
     ]
-    return tuple(dict.fromkeys(f"line {line_of(text, at)}: {why}" for at, why in (*elsewhere, *others)))
+    told = {line_of(text, at) for at, _ in elsewhere}
+    more = [(at, why) for at, why in others if line_of(text, at) not in told]  # an instruction is listed once
+    return tuple(dict.fromkeys(f"line {line_of(text, at)}: {why}" for at, why in (*elsewhere, *more)))

@@ -37,13 +37,20 @@ TOOL = re.compile(
 ASSIGNED = re.compile(r"\b(?P<name>\w++)(?:\.\w++)*+\s*+:=")
 USED = re.compile(r"\\WObj\s*:=\s*(?P<name>\w+)", re.IGNORECASE)
 SHIFTED = re.compile(r"\bPDisp(?:Set|On)\b", re.IGNORECASE)
-NAMED = re.compile(r"\b(?:robtarget|jointtarget)\s+(?P<name>\w+)\s*:=\s*$", re.IGNORECASE)
-INLINE = re.compile(r"\bMove(?:J|AbsJ|L)\s+$", re.IGNORECASE)
+NAMED = re.compile(
+    r"\b(?:robtarget|jointtarget)\s+(?P<name>\w+)\s*(?P<count>\{\s*\d+\s*\})?\s*:=\s*(?P<list>\[)?", re.IGNORECASE
+)
 PROCESS = r"(?:Arc|Cap|Cut|Disp|Paint|Spot|Trigg)[JLC]\w*"  # moves of the options: their target comes first, too
-MOVE = re.compile(rf"\b(?:Move\w+|{PROCESS})\s+(?:\\\w+\s*,\s*)?(?P<target>[A-Za-z_]\w*)", re.IGNORECASE)
-CIRCLE = re.compile(r"\bMoveC\b", re.IGNORECASE)
+INSTRUCTION = rf"\b(?:Move\w+|{PROCESS})\s+(?:\\\w+\s*,\s*)?"
+NAME = r"[A-Za-z_]\w*(?:\{[^{}]*\})?"
+MOVE = re.compile(rf"{INSTRUCTION}(?P<target>{NAME})", re.IGNORECASE)
+# An arc has two targets: the point on the circle, and its end.
+ROUND = r"\b(?:Move|Arc|Cap|Cut|Disp|Paint|Trigg)C\w*\s+(?:\\\w+\s*,\s*)?"
+ARC = rf"{ROUND}(?:{NAME}|{ROBTARGET.replace('?P<pose>', '?:')})\s*,\s*"
+ARC_END = re.compile(rf"{ARC}(?P<target>{NAME})", re.IGNORECASE)
+INLINE = re.compile(rf"(?:{INSTRUCTION}|{ARC})$", re.IGNORECASE)
 REST = re.compile(r"\bMove\w+\s+(?:\[.*\]\]|\w+)\s*(?P<rest>(?:\\[^,]*)?,.*;)", re.IGNORECASE)
-LONGEST = 200  # letters between the beginning of a declaration, or of a move, and its target
+LONGEST = 400  # letters between the beginning of a move and its last target
 QUARTER = np.pi / 2.0
 CF = ((0, 0), (1, 3), (2, 5))  # entry of confdata, joint from 0
 
@@ -52,22 +59,18 @@ def find(text: str, n_joints: int) -> literal.Targets:
     """Of a module."""
     code = literal.blanked(text, "!")
     places = _places(code)
-    by_name = literal.moves_of(text, code, MOVE, places, ";")
+    by_name = literal.moves_of(text, code, (MOVE, ARC_END), places, ";")
+    declared = {at: name for match in NAMED.finditer(code) for at, name in _declared(code, match)}
     literals: list[literal.Literal] = []
     for match in TARGET.finditer(code):
-        first = max(0, match.start() - LONGEST)
-        before = code[first : match.start()]
-        named, inline = NAMED.search(before), INLINE.search(before)
-        if inline:
+        first = max(code.rfind(";", 0, match.start()) + 1, match.start() - LONGEST)
+        inline, name = INLINE.search(code[first : match.start()]), declared.get(match.start())
+        if name is not None:
+            literals.append(_literal(text, match, name, literal.moves_to(by_name, name)))
+        elif inline:
             moves = (literal.instruction(text, first + inline.start(), places, ";"),)
-            name = f"line {literal.line_of(text, match.start())}"
-        elif named:
-            name, moves = named["name"], tuple(by_name.get(named["name"].lower(), ()))
-        else:
-            continue
-        literals.append(_literal(text, match, name, moves))
-    circles = ((m.start(), "a circular move is not corrected") for m in CIRCLE.finditer(code))
-    skipped = literal.sentences(text, by_name, literals, circles)
+            literals.append(_literal(text, match, f"line {literal.line_of(text, match.start())}", moves))
+    skipped = literal.sentences(text, by_name, literals, literal.unread(text, code, TARGET, literals))
     if SHIFTED.search(code):
         return literal.Targets(
             (), ("the program displaces its targets (PDispSet, PDispOn), which is not corrected", *skipped)
@@ -75,6 +78,15 @@ def find(text: str, n_joints: int) -> literal.Targets:
     if n_joints != 6:
         return literal.Targets((), (*skipped, f"RAPID targets have six axes, this arm has {n_joints}"))
     return literal.Targets(tuple(literals), skipped)
+
+
+def _declared(code: str, match: re.Match[str]) -> list[tuple[int, str]]:
+    """Where the targets of a declaration begin, and their names: of an array one for each element, counted from 1."""
+    if not match["count"]:
+        return [(match.start("list"), match["name"])]
+    end = code.find(";", match.end())
+    elements = TARGET.finditer(code, match.end(), len(code) if end < 0 else end)
+    return [(element.start(), f"{match['name']}{{{k}}}") for k, element in enumerate(elements, start=1)]
 
 
 def _literal(text: str, match: re.Match[str], name: str, moves: tuple[literal.Move, ...]) -> literal.Literal:

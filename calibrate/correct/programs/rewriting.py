@@ -4,7 +4,10 @@ The prediction is made of the numbers as they are written, rounding included.
 """
 
 import difflib
+import re
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +27,7 @@ from calibrate.correct.corrected import (
 )
 from calibrate.correct.programs.fanuc_ls import FANUC_LS
 from calibrate.correct.programs.krl import KRL
-from calibrate.correct.programs.literal import Dialect, Literal, Targets
+from calibrate.correct.programs.literal import Dialect, Literal, Targets, line_of
 from calibrate.correct.programs.rapid import RAPID
 from calibrate.correct.programs.stated_frames import stated
 from calibrate.correct.programs.urscript import URSCRIPT
@@ -34,18 +37,36 @@ from calibrate.rigid import inverse
 
 Floats = NDArray[np.float64]
 
+LINE = re.compile(r"line (\d+)\b")
+# Moves along a line or an arc, of all dialects.
+ALONG = re.compile(
+    r"\b(?:(?:Move|Arc|Cap|Cut|Disp|Paint|Trigg)[LC]|S?LIN\b|S?CIRC\b|move[lpc]\b)|^\s*\d*:\s*[LCA]\s", re.IGNORECASE
+)
 DIALECTS = (URSCRIPT, KRL, RAPID, FANUC_LS)
 
 
 @dataclass(frozen=True, eq=False)
 class CorrectedProgram:
-    """`diff` unified, line by line; `names` of the targets, one a row of `found`; `skipped` sentences on the others."""
+    """`diff` unified, line by line; `names` of the targets, one a row of `found`, and `frames` (target, 4, 4) in the
+    base.
+
+    `skipped`: sentences on the others; `kept`: names of joint targets, which stay; `seams`: sentences on moves along a
+    line from a target that is corrected to one that is not, or the reverse.
+    """
 
     text: str
     diff: tuple[str, ...]
     names: tuple[str, ...]
+    frames: Floats
     found: Corrected
     skipped: tuple[str, ...]
+    kept: tuple[str, ...]
+    seams: tuple[str, ...]
+    pieces: tuple[tuple[int, int, str], ...]  # from, to in the text that was given, and what stands there now
+
+    def placed(self, at: int) -> int:
+        """Where a place between the lines of the text that was given is now."""
+        return at + sum(len(new) - (end - begin) for begin, end, new in self.pieces if end <= at)
 
 
 def dialect_of(suffix: str) -> Dialect | None:
@@ -71,7 +92,11 @@ def correct_program(
     """
     arms = Arms.of(model, options)
     targets = dialect.find(text, arms.n_joints)
-    targets, base, tool = stated(targets, text, frame, options.tool, arms.stated_tool, name)
+    kept = tuple(one.name for one in targets.literals if one.joints and not options.joint_targets)
+    some = tuple(one for one in targets.literals if options.joint_targets or not one.joints)
+    if kept and not some:
+        raise DataError(f"{name}: all {len(kept)} targets are joint targets, which stay as they are; --joint-targets")
+    targets, base, tool = stated(replace(targets, literals=some), text, frame, options.tool, arms.stated_tool, name)
     options = replace(options, tool=tool)
     arms = Arms.of(model, options)
     _check(targets, dialect, options, name)
@@ -101,7 +126,24 @@ def correct_program(
     new = _replaced(text, pieces)
     changes = difflib.unified_diff(text.splitlines(), new.splitlines(), name, "corrected", lineterm="", n=0)
     names = tuple(one.name for one in targets.literals)
-    return CorrectedProgram(new, tuple(changes), names, replace(found, q_rad=q_rad, after=after), targets.skipped)
+    found = replace(found, q_rad=q_rad, after=after)
+    seams = _seams(text, targets, np.isfinite(q_rad).all(axis=1).tolist())
+    return CorrectedProgram(new, tuple(changes), names, base, found, targets.skipped, kept, seams, tuple(pieces))
+
+
+def _seams(text: str, targets: Targets, done: Sequence[bool]) -> tuple[str, ...]:
+    """Where a move along a line or an arc begins at a target that is corrected and ends at one that is not."""
+    lines = {
+        line_of(text, move.line_start): ok for one, ok in zip(targets.literals, done, strict=True) for move in one.moves
+    }
+    lines |= {int(found[1]): False for sentence in targets.skipped if (found := LINE.match(sentence))}
+    written, order = text.splitlines(), sorted(lines)
+    return tuple(
+        f"lines {a} and {b}: the one target is corrected, the other is not; the seam between them is neither as taught "
+        "nor as drawn"
+        for a, b in pairwise(order)
+        if lines[a] != lines[b] and ALONG.search(written[b - 1])
+    )
 
 
 def _check(targets: Targets, dialect: Dialect, options: Options, name: str) -> None:

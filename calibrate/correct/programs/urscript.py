@@ -5,7 +5,7 @@ movej and movel take either form; a comment begins with #.
 """
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -13,29 +13,39 @@ from calibrate.correct.programs import literal
 from calibrate.correct.rotations import VECTOR
 
 LIST = rf"(?P<pose>p?)\[\s*{literal.NUMBER}(?:\s*,\s*{literal.NUMBER})*\s*\]"
-MOVE = re.compile(r"\b(?:movej|movel|movep|servoj|movec)\s*\(\s*(?P<target>p?\[|[A-Za-z_]\w*)")
-INLINE = re.compile(rf"\b(?:movej|movel|movep|servoj)\s*\(\s*(?:q\s*=\s*|pose\s*=\s*)?{LIST}")
+NAME = r"[A-Za-z_]\w*(?:\[[^\[\]]*\])?"
+MOVE = re.compile(rf"\b(?:movej|movel|movep|servoj|movec)\s*\(\s*(?:\w+\s*=\s*)?(?P<target>p?\[|{NAME})")
+INLINE = re.compile(rf"\b(?:movej|movel|movep|servoj|movec)\s*\(\s*(?:\w+\s*=\s*)?{LIST}")
+# An arc has two targets: a point on it, and its end.
+ARC = rf"\bmovec\s*\(\s*(?:\w+\s*=\s*)?(?:{NAME}|p\[[^\[\]]*\])\s*,\s*(?:\w+\s*=\s*)?"
+ARC_END = re.compile(rf"{ARC}(?P<target>p?\[|{NAME})")
+INLINE_END = re.compile(ARC + LIST)
+POSE = re.compile(rf"(?<!\w)(?P<pose>p)\[\s*{literal.NUMBER}(?:\s*,\s*{literal.NUMBER}){{5}}\s*\]")
+ARRAY = re.compile(r"(?<!\w)(?P<name>[A-Za-z_]\w*)\s*=\s*\[\s*(?=p\[)")
 ASSIGNED = re.compile(rf"(?<!\w)(?P<name>[A-Za-z_]\w*)\s*=\s*{LIST}")
 TCP = re.compile(rf"\bset_tcp\s*\(\s*(?P<literal>{LIST}\s*\))?")
-CIRCLE = re.compile(r"\bmovec\s*\(")
 
 
 def find(text: str, n_joints: int) -> literal.Targets:
     """Literals of moves, and of variables that moves go to."""
     code = literal.blanked(text, "#")
     places = _places(code)
-    by_name = literal.moves_of(text, code, MOVE, places)
+    by_name = literal.moves_of(text, code, (MOVE, ARC_END), places)
     literals: list[literal.Literal] = []
-    for match in INLINE.finditer(code):
-        literals.append(_literal(text, match, "", (literal.instruction(text, match.start(), places),), n_joints))
-    for match in ASSIGNED.finditer(code):
-        if match["name"].lower() in by_name:
-            moves = tuple(by_name[match["name"].lower()])
-            literals.append(_literal(text, match, match["name"], moves, n_joints))
+    for match in (*INLINE.finditer(code), *INLINE_END.finditer(code)):
+        literals.append(_literal(text, match, "", (literal.instruction(text, match.start(), places),)))
+    named = [(match["name"], match) for match in ASSIGNED.finditer(code)]
+    named += [(f"{array['name']}[{k}]", one) for array in ARRAY.finditer(code) for k, one in _elements(code, array)]
+    for name, match in named:
+        if moves := literal.moves_to(by_name, name):
+            literals.append(_literal(text, match, name, moves))
     good = [one for one in literals if len(one.numbers) == (n_joints if one.joints else 6)]
-    named = {target: moves for target, moves in by_name.items() if target not in ("[", "p[")}
-    circles = ((m.start(), "a circular move is not corrected") for m in CIRCLE.finditer(code))
-    skipped = literal.sentences(text, named, good, circles)
+    by_name = {target: moves for target, moves in by_name.items() if target not in ("[", "p[")}
+    tools = [match.span() for match in TCP.finditer(code)]
+    left = [
+        one for one in literal.unread(text, code, POSE, good) if not any(begin <= one[0] < end for begin, end in tools)
+    ]
+    skipped = literal.sentences(text, by_name, good, left)
     return literal.Targets(tuple(sorted(good, key=lambda one: one.at)), skipped)
 
 
@@ -51,9 +61,15 @@ def _places(code: str) -> literal.Places:
     return lambda at: (base, literal.last_before(tools, starts, at, literal.NamedPose()))
 
 
-def _literal(
-    text: str, match: re.Match[str], name: str, moves: tuple[literal.Move, ...], n_joints: int
-) -> literal.Literal:
+def _elements(code: str, array: re.Match[str]) -> Iterator[tuple[int, re.Match[str]]]:
+    """Poses of a list, counted from 0."""
+    at, k = array.end(), 0
+    while (one := POSE.match(code, at)) is not None:
+        yield k, one
+        at, k = len(code) - len(code[one.end() :].lstrip(", \t\r\n")), k + 1
+
+
+def _literal(text: str, match: re.Match[str], name: str, moves: tuple[literal.Move, ...]) -> literal.Literal:
     at = match.start("pose")
     found = list(literal.numbers_in(text, at, match.end()))
     label = name or f"line {literal.line_of(text, at)}"

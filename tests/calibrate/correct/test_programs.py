@@ -126,7 +126,7 @@ def corrected(text, suffix, options=None, **fields):
         given["near_rad"],
         given["every"],
         inverse(),
-        options or Options(tool=TOOL),
+        options or Options(tool=TOOL, joint_targets=True),
         "weld" + suffix,
     )
 
@@ -180,7 +180,7 @@ def test_skipped_moves_are_named():
 @pytest.mark.parametrize("suffix", [".script", ".src", ".mod"])
 def test_overshoot_points_stand_before_their_moves(suffix):
     text = PROGRAMS[suffix][0]()
-    done = corrected(text, suffix, Options(tool=TOOL, approach=1))
+    done = corrected(text, suffix, Options(tool=TOOL, approach=1, joint_targets=True))
     words = {".script": "movej([", ".src": "PTP {A1", ".mod": "MoveAbsJ [["}[suffix]
     added = [line for line in done.text.splitlines() if line.strip().startswith(words)]
     had = [line for line in text.splitlines() if line.strip().startswith(words)]
@@ -193,10 +193,10 @@ def test_overshoot_points_stand_before_their_moves(suffix):
 
 def test_what_cannot_be_done_is_refused():
     with pytest.raises(DataError, match="overshoot points cannot be inserted"):
-        corrected(fanuc(), ".ls", Options(tool=TOOL, approach=1))
+        corrected(fanuc(), ".ls", Options(tool=TOOL, approach=1, joint_targets=True))
     declared = krl().replace("  LIN {E6POS: ", "  DECL E6POS XP1 = {")
     with pytest.raises(DataError, match="no move in this file goes to XP1"):
-        corrected(declared, ".src", Options(tool=TOOL, approach=1), frame=np.eye(4))
+        corrected(declared, ".src", Options(tool=TOOL, approach=1, joint_targets=True), frame=np.eye(4))
     with pytest.raises(DataError, match="no target"):
         corrected("DEF a()\nEND\n", ".src")
 

@@ -58,7 +58,7 @@ def test_a_move_without_an_end_does_not_take_the_rest_of_the_program() -> None:
     def places(at: int) -> tuple[literal.NamedPose, literal.NamedPose]:
         return nothing
 
-    moves = literal.moves_of(text, text, rapid.MOVE, places, ";")
+    moves = literal.moves_of(text, text, (rapid.MOVE,), places, ";")
     assert max(len(move.text) for move in moves["a"]) <= LONGEST_MOVE + len("MoveL a\n")
 
 
