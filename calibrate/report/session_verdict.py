@@ -19,7 +19,18 @@ from calibrate.model_file import Fields, UnseenRows
 from calibrate.report.model_tests import Repeated, Scatter, proofs, repeated, scatter
 from calibrate.report.quantities import counted, significant
 from calibrate.report.session_evidence import SessionEvidence
-from calibrate.report.verdict import AGAIN, MORE_POSES, NOISIER, UNCHECKED, WORSE_UNSEEN, Doubt, Trust, Verdict
+from calibrate.report.verdict import (
+    AGAIN,
+    MORE_POSES,
+    NOISIER,
+    TO_PROVE,
+    UNCHECKED,
+    UNPROVED,
+    WORSE_UNSEEN,
+    Doubt,
+    Trust,
+    Verdict,
+)
 from calibrate.sensors.catalogue import kind_of
 from calibrate.uncertainty.fit_statistics import Alarm, checks_nothing
 
@@ -93,6 +104,9 @@ def session_verdict(evidence: SessionEvidence, diagnosis: DiagnosisFile | None =
     if checks_nothing(evidence.spare):
         return Verdict(Trust.NONE, f"{UNCHECKED} Do not use this model.", reasons, (MORE_POSES, *advice))
     first = next(iter(proofs(model)), None)
+    if model.session is None and first is None:  # a diagnosis keeps its proof in diagnosis.json
+        sentence = f"{_how_good(evidence, first)} {UNPROVED} Do not use this model."
+        return Verdict(Trust.NONE, sentence, (UNPROVED, *reasons), (TO_PROVE, *advice))
     if first is not None and first.rms_distance_after_m > NO_BETTER * first.rms_distance_before_m:
         keep = "Keep the nominal values; find out what is wrong with arm, instrument or poses, and measure again."
         return Verdict(Trust.NONE, f"{_how_good(evidence, first)} Do not use this model.", reasons, (keep, *advice))
@@ -148,11 +162,6 @@ def _doubts(evidence: SessionEvidence) -> Iterator[Doubt]:
         yield (
             f"What remains {along} ({worst.share:.0%} of it, F = {significant(worst.f)}): the model lacks something.",
             "The figures along the joints, below, show where physics is missing; `calibeam diagnose` finds what it is.",
-        )
-    if model.session is None and not proofs(model):  # a diagnosis keeps its proof in diagnosis.json
-        yield (
-            "There is no proof on unseen rows: too few rows, or it was not asked for.",
-            "Measure at least 15 poses, better 50, so that some can be kept for the proof.",
         )
     yield from _doubts_of_proofs(proofs(model))
     share = evidence.left_out / max(len(recording.samples), 1)
@@ -238,12 +247,13 @@ def _noisy_sources(noise: Fields) -> Iterator[Doubt]:
 def _doubts_of_proofs(found: tuple[UnseenRows, ...]) -> Iterator[Doubt]:
     told = set[str]()
     for proof in found:
-        # rows elsewhere than the others are missed by what these leave open, too: no fault of the model
-        beyond = proof.chi_after if proof.chi_predicted is None else proof.chi_predicted
-        if proof.split in told or not isfinite(beyond) or beyond <= WORSE_UNSEEN:
+        # Rows elsewhere than the others are missed by what these leave open, too: no fault of the model, and an error.
+        if proof.split in told or not isfinite(proof.chi_after) or proof.chi_after <= WORSE_UNSEEN:
             continue
         told.add(proof.split)
+        predicted = proof.chi_predicted
+        sigmas = "" if predicted is None else f" ({significant(predicted)} times what noise and sigmas predict)"
         yield (
-            f"Unseen rows ({proof.split}) are missed by {significant(beyond)} times what noise and sigmas predict.",
+            f"Unseen rows ({proof.split}) are missed by {significant(proof.chi_after)} times the noise{sigmas}.",
             "Check that nothing moved during the session, and measure where the arm will work.",
         )

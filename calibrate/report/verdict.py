@@ -11,12 +11,15 @@ from enum import Enum
 from calibrate.report.elements import Html, bullets, join, tag, tile
 
 UNLIKELY = 0.01  # lack of fit: the usual level (Draper, Smith, Applied Regression Analysis, 1998, ch. 2.1)
-WORSE_UNSEEN = 1.5  # error on unseen poses over its own uncertainty; of a healthy fit near 1
+WORSE_UNSEEN = 1.5  # error on unseen poses over the noise; of a healthy fit near 1
 NOISIER = 3.0  # found over assumed; assumed noise is often wrong by this much, beyond it something is broken
 AGAIN = "Measure again, with more and more different poses."
 
 UNCHECKED = "There are as many unknowns as readings, or nearly so: any arm would fit, and the result cannot be checked."
 MORE_POSES = "Measure more poses: at least 15, better 50, all over the workspace."
+
+UNPROVED = "There is no proof on unseen rows: too few rows, or it was not asked for."
+TO_PROVE = "Measure at least 15 poses, better 50, so that some can be kept for the proof."
 
 Doubt = tuple[str, str]  # what speaks against trust, and what to do about it
 
