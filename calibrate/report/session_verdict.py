@@ -15,7 +15,7 @@ from scipy.special import fdtrc
 
 from calibrate.diagnose.schema import DiagnosisFile
 from calibrate.fit import Status
-from calibrate.model_file import Fields, UnseenRows
+from calibrate.model_file import Fields, ModelFile, UnseenRows
 from calibrate.report.model_tests import Repeated, Scatter, proofs, repeated, scatter
 from calibrate.report.quantities import counted, significant
 from calibrate.report.session_evidence import SessionEvidence
@@ -96,7 +96,7 @@ FAILED = (Status.NOT_FINITE.name, Status.OUT_OF_STEPS.name, Status.STALLED.name)
 def session_verdict(evidence: SessionEvidence, diagnosis: DiagnosisFile | None = None) -> Verdict:
     """From model and recording; the thresholds are those at the top of this file and of verdict.py."""
     model = evidence.model
-    doubts = [*_doubts(evidence), *_doubts_of_rank(evidence), *_doubts_of_diagnosis(diagnosis)]
+    doubts = [*_doubts(evidence), *_doubts_of_rank(evidence), *_doubts_of_diagnosis(diagnosis, model)]
     reasons = tuple(says for says, _ in doubts)
     advice = tuple(dict.fromkeys((*(do for _, do in doubts if do), *_harmless(scatter(model)))))
     if model.status in FAILED:
@@ -187,9 +187,11 @@ def _doubts_of_rank(evidence: SessionEvidence) -> Iterator[Doubt]:
         )
 
 
-def _doubts_of_diagnosis(found: DiagnosisFile | None) -> Iterator[Doubt]:
-    """What the diagnosis of the same recording opposes; nothing where it agrees or was not made."""
-    if found is None or found.verdict == "consistent":
+def _doubts_of_diagnosis(found: DiagnosisFile | None, model: ModelFile) -> Iterator[Doubt]:
+    """What the diagnosis of the same recording opposes; nothing where it agrees or was not made, or where the model
+    is of a diagnosis and holds the physics that it found.
+    """
+    if found is None or found.verdict == "consistent" or (found.verdict == "mismatch" and model.session):
         return
     if found.verdict == "mismatch":
         causes = counted(len(found.findings), "cause")

@@ -18,7 +18,6 @@ from numpy.typing import NDArray
 
 from calibrate.arms.model import KinematicModel
 from calibrate.arms.serial import point_by_parameter
-from calibrate.fit import Fit
 from calibrate.identifiability import Identifiability
 from calibrate.parameters import Parameter, index_of
 from calibrate.rigid import cross_matrix
@@ -37,6 +36,13 @@ class Valued(Protocol):
 
     @property
     def theta(self) -> Floats: ...
+
+
+class Covaried(Valued, Protocol):
+    """Values with their covariance (param, param)."""
+
+    @property
+    def covariance(self) -> Floats: ...
 
 
 class FreeSpaceStatus(Enum):
@@ -83,7 +89,7 @@ class FreeSpaceError:
 
 def free_space_error(
     model: KinematicModel,
-    fit: Fit,
+    fit: Covaried,
     seen: Identifiability,
     workspace: Workspace,
     rng: Generator,

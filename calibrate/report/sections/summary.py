@@ -130,14 +130,15 @@ def _errors(evidence: SessionEvidence) -> tuple[Number, Number]:
     first, proof = evidence.readings[0], next(iter(proofs(evidence.model)), None)
     if proof is None:
         before, after = _rms(first.error_before), _rms(first.error_after)
-        on = f"rms distance of {_what(first)}, those of the fit itself"
+        which, on = "Fitted readings", f"rms distance of {_what(first)}, those of the fit itself"
     else:
         before, after = proof.rms_distance_before_m, proof.rms_distance_after_m
+        which = "Unseen readings"
         on = f"rms distance of {proof.observations} {_what(first)} that the fit has not seen"
     gain = f"; {significant(before / after)} times smaller" if after > 0.0 else ""
     return (
-        Number("as_drawn", "Unseen readings, nominal", before, first.unit, first.says(before), f"{on}; nominal arm"),
-        Number("now", "Unseen readings, calibrated", after, first.unit, first.says(after), on + gain),
+        Number("as_drawn", f"{which}, nominal", before, first.unit, first.says(before), f"{on}; nominal arm"),
+        Number("now", f"{which}, calibrated", after, first.unit, first.says(after), on + gain),
     )
 
 

@@ -28,7 +28,14 @@ from calibrate.report.session_evidence import SessionEvidence
 from calibrate.report.verdict import Number
 from calibrate.rigid import cross_matrix
 from calibrate.sensors.catalogue import LENGTHS
-from calibrate.uncertainty.free_space import FreeSpaceStatus, Scatter, target_by_parameter, variance_of_scatter
+from calibrate.uncertainty.free_space import (
+    FreeSpaceStatus,
+    Scatter,
+    Workspace,
+    free_space_error,
+    target_by_parameter,
+    variance_of_scatter,
+)
 from calibrate.unseen_along import analyse_along
 
 Floats = NDArray[np.float64]
@@ -189,11 +196,14 @@ MOST = 0.5  # of the error that remains with all of them known: above, they are 
 def session_arm(evidence: SessionEvidence) -> KnownArm | str:
     """The arm with its uncertainty, or why no error over the workspace can be determined."""
     problem, model, theta = evidence.problem, evidence.model, evidence.theta
-    why = unpredicted(model.free_space)
-    if why is not None or model.free_space is None:
-        return why or ""
-    lower, upper = limits_of(evidence.recording.rig)
-    return KnownArm(
+    rig, room = evidence.recording.rig, model.free_space
+    with_physics = room is None and model.session is not None and model.covariance is not None
+    why = None if with_physics else unpredicted(room)
+    if why is not None:
+        return why
+    stated = model.about.get("tool", rig.tool.point_m or (0.0, 0.0, 0.0))[:3] if room is None else room.point_m
+    lower, upper = limits_of(rig)
+    known = KnownArm(
         evidence.arm,
         problem.parameters,
         evidence.drawn,
@@ -201,11 +211,16 @@ def session_arm(evidence: SessionEvidence) -> KnownArm | str:
         whole_covariance(model.covariance, problem.parameters),
         analyse_along(problem.fulfilled(theta), theta, without_assumed(problem.parameters)),
         scatter_of(model.noise),
-        np.array(model.free_space.point_m),
+        np.array(stated),
         lower,
         upper,
         evidence.q_rad,
     )
+    if not with_physics:
+        return known
+    asked = Workspace(lower, upper, known.point_m)
+    found = free_space_error(evidence.arm, known, known.seen, asked, np.random.default_rng(0))
+    return f"{found.status.value} ({'; '.join(found.undetermined)})" if found.rms_m is None else known
 
 
 def session_room(evidence: SessionEvidence) -> Room | str:

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from acquisition.recording.rig import parse_rig
+from calibrate.diagnose.schema import DiagnosisFile
 from calibrate.report.session_evidence import session_evidence
 from calibrate.report.session_verdict import session_verdict
 from calibrate.report.verdict import Trust
@@ -95,6 +96,15 @@ def test_a_model_of_a_diagnosis_is_trusted_as_any_other(arm_session):
     recording = session.recording(session.positions())
     judged = session_verdict(session_evidence(recording, session.model_of_diagnosis(recording)))
     assert (judged.trust, judged.reasons) == (Trust.GOOD, ())
+
+
+def test_physics_that_a_diagnosis_found_is_a_doubt_only_where_the_model_is_not_of_a_diagnosis(healthy, arm_session):
+    found = DiagnosisFile(1, "mismatch", 1e-5, 1e-4, 1e-5, (), None, ())
+    assert session_verdict(healthy, found).trust is Trust.CARE
+    session = arm_session(120)
+    recording = session.recording(session.positions())
+    with_physics = session_evidence(recording, session.model_of_diagnosis(recording))
+    assert session_verdict(with_physics, found).trust is Trust.GOOD
 
 
 def test_the_one_noisy_source_of_several_is_named(healthy):

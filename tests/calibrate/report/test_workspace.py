@@ -34,6 +34,20 @@ def room(arm):
     return room_of(arm)
 
 
+def test_a_model_of_a_diagnosis_has_the_tool_error_of_the_same_identification(arm_session, known, room):
+    session = arm_session(60)
+    recording = session.recording(session.positions())
+    diagnosed = session_arm(session_evidence(recording, session.model_of_diagnosis(recording)))
+    assert not isinstance(diagnosed, str), diagnosed
+    of_both = [float(np.sqrt(np.mean(r.found_m[r.supported] ** 2))) for r in (room, room_of(diagnosed))]
+    assert of_both[1] == pytest.approx(of_both[0], rel=0.25)
+
+
+def test_a_model_without_covariance_has_none(known):
+    without = replace(known, model=msgspec.structs.replace(known.model, free_space=None, covariance=None))
+    assert isinstance(session_arm(without), str)
+
+
 @pytest.mark.parametrize("row", [0, 31])
 def test_a_pose_left_out_is_missed_as_by_a_fit_of_the_others(known, arm, row):
     held = {n for n, v in zip((p.name for p in arm.parameters), np.diag(arm.covariance), strict=True) if v == 0.0}
