@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from calibrate.blunders.bad_rows import bad_rows
 from calibrate.blunders.finding import Blunder, BlunderKind
-from calibrate.blunders.shots import outlying
+from calibrate.blunders.shots import Shots, outlying, robust_scale
 from calibrate.errors import DataError
 from calibrate.identification.rounds import distances, wary_fit
 from calibrate.identification.session import columns_of, shots_of
@@ -22,6 +22,8 @@ Floats = NDArray[np.float64]
 
 FEWEST_ROWS = 12  # of an instrument: below, it is open which row is the odd one
 PASSES = 3  # bad rows can hide behind worse ones
+SEVERAL = 3.0  # times the assumed noise, which is often wrong by less
+UNMISTAKABLE = 30.0  # robust sigmas; rows of soft arms lie at up to 16
 UNSEEN = 1e-9  # of the largest singular value, columns scaled: the data do not see it
 MOST_BAD = 0.4  # of the rows: beyond, the question is which of two sessions is the right one
 
@@ -75,8 +77,20 @@ def _found(weighting: Weighting, theta: Floats) -> list[Blunder]:
         shots = replace(shots, met=met)
         blocks = kind_of(measured.name).blocks(shots)
         inside = {row for b in blocks for row in b.rows}
-        out += [*blocks, *(b for b in bad_rows(shots) if b.rows[0] not in inside)]
+        named = [*blocks, *(b for b in bad_rows(shots) if b.rows[0] not in inside)]
+        out += [b for b in named if _beyond_the_arm(b, shots)]
     return out
+
+
+def _beyond_the_arm(blunder: Blunder, shots: Shots) -> bool:
+    """Whether a row is wrong whatever the arm does: where all rows miss by several times the noise, physics is missing
+    from the model, and rows that feel most of it are as good as any.
+    """
+    misfit = shots.misfit()
+    distance = np.linalg.norm(misfit, axis=1)
+    scale = robust_scale(distance, misfit.shape[1], shots.met)
+    mine = distance[np.isin(shots.rows, blunder.rows)]
+    return scale <= SEVERAL or float(np.median(mine)) > UNMISTAKABLE * scale
 
 
 def _met_exactly(problem: JointProblem, index: int, theta: Floats, measured: Measured) -> int:

@@ -103,3 +103,12 @@ def test_a_mirrored_axis_is_refused_by_name(rig, samples):
 def test_a_joint_of_the_other_sense_is_refused_by_name(rig, samples):
     with pytest.raises(DataError, match="column q3_rad: joint 3 turns against"):
         run(rig, changed(samples, q3_rad=-samples.column("q3_rad")))
+
+
+@pytest.mark.parametrize(("off_m", "named"), [(6e-3, False), (6e-2, True)])
+def test_where_all_rows_miss_by_many_times_the_noise_only_what_no_arm_does_is_named(rig, samples, off_m, named):
+    """A soft arm misses some of its rows by 16 times what is usual: not the operator's fault."""
+    rng = np.random.default_rng(3)
+    off = {c: samples.column(c) + 3e-4 * rng.standard_normal(150) for c in POSITION}
+    off["z_m"][33] += off_m
+    assert [b.rows for b in run(rig, changed(samples, **off)).blunders] == ([(33,)] if named else [])
