@@ -5,7 +5,7 @@ The prediction is made of the numbers as they are written, rounding included.
 
 import difflib
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -92,6 +92,7 @@ def correct_program(
     """
     arms = Arms.of(model, options)
     targets = dialect.find(text, arms.n_joints)
+    every_target = targets.literals
     kept = tuple(one.name for one in targets.literals if one.joints and not options.joint_targets)
     some = tuple(one for one in targets.literals if options.joint_targets or not one.joints)
     if kept and not some:
@@ -103,6 +104,8 @@ def correct_program(
     if not all((np.abs(T[..., :3, :]) <= LENGTH_M).all() for T in (base, tool) if T is not None):
         raise DataError(f"{name}: a frame or tool has a number beyond {LENGTH_M / 1e3:g} km; correct it")
     wanted = _wanted(targets.literals, dialect, arms, base, near_rad, every)
+    for row, joints_rad in _behind_joints(every_target, targets.literals, dialect):
+        wanted.near_rad[row] = joints_rad
     found = correct(model, replace(wanted, source=name), inverse_of, options)
     pieces, q_rad = list[tuple[int, int, str]](), found.q_rad.copy()
     told = inverse(base) @ found.T_base_tool
@@ -129,6 +132,14 @@ def correct_program(
     found = replace(found, q_rad=q_rad, after=after)
     seams = _seams(text, targets, np.isfinite(q_rad).all(axis=1).tolist())
     return CorrectedProgram(new, tuple(changes), names, base, found, targets.skipped, kept, seams, tuple(pieces))
+
+
+def _behind_joints(every: Sequence[Literal], some: Sequence[Literal], dialect: Dialect) -> Iterator[tuple[int, Floats]]:
+    """Rows of the targets that come next after a joint target which stays, and its joints: the posture before them."""
+    row_of = {one.at: row for row, one in enumerate(some)}
+    for before, after in pairwise(every):
+        if before.joints and before.at not in row_of and after.at in row_of:
+            yield row_of[after.at], dialect.joints_rad(before.numbers)
 
 
 def _seams(text: str, targets: Targets, done: Sequence[bool]) -> tuple[str, ...]:

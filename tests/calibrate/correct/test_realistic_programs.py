@@ -172,6 +172,15 @@ def test_joint_targets_are_corrected_on_request():
         corrected("def a():\n  movej([0.1, -1.2, 1.3, 0.2, 1.1, 0.0])\nend\n", ".script")
 
 
+def test_a_joint_target_that_stays_is_the_posture_before_the_next():
+    """Far from the middle of the range, from which another branch would be nearer."""
+    text = f"movej([{', '.join(f'{v:.6f}' for v in Q[4])}])\nmovel({ur(4)})\n"
+    done = correct_program(
+        model(), text, dialect_of(".script"), None, -Q[4], {}, inverse(), Options(tool=TOOL), "weld.script"
+    )
+    np.testing.assert_allclose(done.found.nominal_rad[0], Q[4], atol=1e-4)
+
+
 def test_a_seam_that_begins_corrected_and_goes_on_as_it_was_is_named():
     text = f"movel({ur(0)})\nmovel({ur(1)})\nmovel(pose_trans({ur(1)}, p[0.0, 0.0, 0.1, 0.0, 0.0, 0.0]))\n"
     done = corrected(text, ".script")
