@@ -151,7 +151,7 @@ def _seams(text: str, targets: Targets, done: Sequence[bool]) -> tuple[str, ...]
     written, order = text.splitlines(), sorted(lines)
     return tuple(
         f"lines {a} and {b}: the one target is corrected, the other is not; the seam between them is neither as taught "
-        "nor as drawn"
+        "nor as planned"
         for a, b in pairwise(order)
         if lines[a] != lines[b] and ALONG.search(written[b - 1])
     )
