@@ -188,7 +188,12 @@ def _calls(code: str, routine: str) -> list[int]:
 
 
 def _alike(one: Used, other: Used) -> bool:
-    return all(a.name == b.name and np.array_equal(a.T, b.T) for a, b in zip(one, other, strict=True))
+    """The same names, hence the same poses, which a file states once; poses without a name by their numbers."""
+    return all(a.name == b.name and _places_of(a) == _places_of(b) for a, b in zip(one, other, strict=True))
+
+
+def _places_of(place: literal.NamedPose) -> list[float]:
+    return [] if place.T is None else place.T.ravel().tolist()
 
 
 def _key(name: str) -> str:
