@@ -130,7 +130,7 @@ def correct_program(
     changes = difflib.unified_diff(text.splitlines(), new.splitlines(), name, "corrected", lineterm="", n=0)
     names = tuple(one.name for one in targets.literals)
     found = replace(found, q_rad=q_rad, after=after)
-    seams = _seams(text, targets, np.isfinite(q_rad).all(axis=1).tolist())
+    seams = _seams(text, targets, [bool(np.isfinite(joints).all()) for joints in q_rad])
     return CorrectedProgram(new, tuple(changes), names, base, found, targets.skipped, kept, seams, tuple(pieces))
 
 
