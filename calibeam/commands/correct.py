@@ -127,10 +127,10 @@ def correct_command(
     )
     _print_found(console, job.known, found, names, frames, left, (*needless, *notes, *found.notes), verbose)
     console.print(f"corrected: {out}", markup=False)
-    lost = int(np.sum(~np.isfinite(found.q_rad).all(axis=1))) + left
-    if lost:
-        count = len(names) + left
-        raise PartialResult(f"{count - lost} of {count} corrected; {lost} left as they were, named above")
+    lost, count = int(np.sum(~np.isfinite(found.q_rad).all(axis=1))), len(names) + left
+    if lost + left:
+        why = f"; {lost} have no command" if lost else ""
+        raise PartialResult(f"{count - lost - left} of {count} corrected; {lost + left} left, named above{why}")
 
 
 @dataclass(frozen=True, eq=False)

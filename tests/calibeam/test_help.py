@@ -45,6 +45,7 @@ def test_help_reads_as_it_was_written(name: str, capsys: pytest.CaptureFixture[s
 SEVERAL = {  # option: a command line with two of its values, the second of them
     "identify --export": ("identify REC --export urdf mjcf", "mjcf"),
     "move --joints-deg": ("move RIG --joints-deg 17 -80 92", 92.0),
+    "correct --frame": ("correct M P --out O --frame 1 2 3 0 0 0.5", "0.5"),
     "correct --start": ("correct M P --out O --start 17 -80", -80.0),
     "correct --condition": ("correct M P --out O --condition payload_kg=2 qd1_rad_s=1", "qd1_rad_s=1"),
     "emulate --hide": ("emulate RIG --hide a b", "b"),

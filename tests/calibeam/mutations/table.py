@@ -150,7 +150,10 @@ MODELS = (
     Pair("guided.json", "verify guided --model guided.json"),
     Pair("arm.json", "correct arm.json poses.csv --out made.csv"),
     Pair("poses.csv", "correct arm.json poses.csv --out made.csv"),
-    *(Pair(f"weld.{one}", f"correct arm.json weld.{one} --out made.{one}") for one in ("src", "script", "mod", "ls")),
+    *(
+        Pair(f"weld.{one}", f"correct arm.json weld.{one} --out made.{one} --joint-targets")
+        for one in ("src", "script", "mod", "ls")
+    ),
     Pair("model.json", "iso9283 evaluate cycled --model model.json --out made.json"),
     Pair("cycled/samples.csv", "iso9283 evaluate cycled --model model.json --frame fit --out made.json"),
     Pair("cycled/rig.toml", "iso9283 evaluate cycled/samples.csv --rig cycled/rig.toml --out made.json"),
