@@ -7,6 +7,7 @@ targets of PTP, LIN, SPTP and SLIN and declared points; tools, bases and relativ
 import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -134,6 +135,7 @@ def _places(code: str) -> tuple[literal.Places, dict[str, tuple[literal.NamedPos
     events = sorted((*ROUTINE.finditer(code), *SET.finditer(code)), key=lambda event: event.start())
     fixed = "the tool is stationary (#TCP), which is not corrected" if FIXED.search(code) else ""
 
+    @cache
     def place(what: str, value: str) -> literal.NamedPose:
         name = _key(value)
         if name in ("$NULLFRAME", "$WORLD", f"{what}_DATA[0]"):
@@ -153,7 +155,6 @@ def _places(code: str) -> tuple[literal.Places, dict[str, tuple[literal.NamedPos
     starts = [event.start() for event in events]
 
     def states(entered: Mapping[str, Used]) -> list[Used]:
-        """After each event, where routines begin with what they are entered with."""
         out, (base, tool) = list[Used](), nothing
         for event in events:
             if event.re is ROUTINE:
