@@ -34,7 +34,7 @@ SEVERAL = 3  # targets: fewer show nothing of how they agree
 class Mounting:
     """`T` (4, 4) flange in the model's last frame; `covariance` (6, 6) of its shift in m and turn in rad, in its axes.
 
-    `targets` stand for it; `measured_m` (target, 3) are their points in the flange, as stated.
+    `measured_m` (target, 3) are their points in the flange, as stated.
     """
 
     T: Floats
