@@ -6,6 +6,7 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
+from mcap.reader import make_reader
 
 from acquisition.recording.rig import load_rig
 from benchmarks.fleet_sessions import Robot, write_fleet
@@ -29,8 +30,16 @@ def fleet(tmp_path_factory):
     root = tmp_path_factory.mktemp("fleet")
     paths = write_fleet(root, [Robot("A-1", 41, {2: OFF_RAD_YEAR})], ("2025-11-03", "2026-11-03"))
     torn = root / "A-1" / "torn.mcap"
-    torn.write_bytes(paths[0].read_bytes()[: paths[0].stat().st_size // 3])
+    torn.write_bytes(paths[0].read_bytes()[: within_the_first_batch(paths[0])])
     return root
+
+
+def within_the_first_batch(path: Path) -> int:
+    """How many rows lie before a given share of the file depends on how often the writer came to write."""
+    with path.open("rb") as file:
+        summary = make_reader(file).get_summary()
+    assert summary is not None
+    return summary.chunk_indexes[0].chunk_start_offset + 100
 
 
 @pytest.fixture(scope="module")
