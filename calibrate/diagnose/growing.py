@@ -28,6 +28,7 @@ from calibrate.effects.term import Term
 AT_ONCE = 4  # sure ones that are accepted before a refit
 PEERS = 8  # physics at a port that are looked at in turn for a plausible entry: ten thermometers are one growth
 LOOKED_AT = 32  # best entries, in all
+REFUSED = 6  # refits in a row that confirm no entry: nothing further can be told apart
 
 
 def admissible(
@@ -51,7 +52,8 @@ def grown(at: Search) -> Search | None:
     null: Null | None = None
     slow = at.bench.menu.of_terms(np.array([is_slow(t) for t in at.bench.menu.terms], dtype=bool))
     out = np.zeros(len(slow), dtype=bool)
-    while True:
+    refused = 0
+    while refused < REFUSED:
         found = replace(at.bench.scores, gain=np.where(out, -np.inf, at.bench.scores.gain))
         proposed = admissible(at.bench, found, None, 0.0, barred)
         if proposed is None:
@@ -70,7 +72,8 @@ def grown(at: Search) -> Search | None:
         bench = Bench(at.state.refitted((*at.state.accepted, *new)))
         if bench.bic < at.bench.bic and bench.plausible[-len(new) :].all():
             return replace(at.at(bench), p=at.p | {a.term.key: p for a in new})
-        barred = barred | {proposed.term.key}
+        barred, refused = barred | {proposed.term.key}, refused + 1
+    return None
 
 
 def _p_of(bench: Bench, proposed: Proposal, null: Null, coarse: float) -> float:

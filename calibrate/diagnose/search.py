@@ -23,6 +23,7 @@ from calibrate.effects.term import Shape
 from calibrate.effects.time_laws import FEWEST_AFTER
 
 MOST = 30  # terms; beyond it the model form is wrong, not incomplete
+VAIN = 2  # additions in a row that were gone again: where many effects are mixed up, a third has never been of use
 
 
 def search(state: State, rng: Generator) -> Search:
@@ -39,6 +40,7 @@ def grown_out(at: Search) -> Search:
     """Grown, swapped and pruned until nothing changes."""
     at = tidied(swapped(at))
     vain: frozenset[Key] = frozenset()  # added, and gone again when the others had found their places
+    in_vain = 0
     for _ in range(MOST):
         open_to = replace(at, banned=at.banned | vain)
         new = grown(open_to) if len(at.state.accepted) < MOST else None
@@ -47,9 +49,9 @@ def grown_out(at: Search) -> Search:
             break
         trial, tried = _at_rest(new)
         if trial.bench.bic < at.bench.bic - BETTER:
-            at = trial
-        elif added := tried - at.keys - vain:
-            vain |= added
+            at, in_vain = trial, 0
+        elif (added := tried - at.keys - vain) and in_vain + 1 < VAIN:
+            vain, in_vain = vain | added, in_vain + 1
         else:
             break
     return at
