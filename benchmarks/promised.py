@@ -32,7 +32,7 @@ from simulators.conceal.readings import stand
 
 Floats = NDArray[np.float64]
 
-MAKES = {"irb120": "ABB IRB 120", "ur5": "UR5e", "large": "large"}
+MAKES = {"irb120": "ABB IRB 120", "ur5": "UR5e", "kr6": "KUKA KR 6 R900"}
 HIDDEN = ("soft-joint", "encoder-eccentricity")
 SAMPLES, POSES = 150, 40
 TORCH_M = 0.148  # from the measured point

@@ -22,7 +22,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--family", choices=FAMILIES, default="dual-psd")
     parser.add_argument("--places", type=int, default=3, help="of the fixture; cones: seats")
     parser.add_argument("--samples", type=int, default=300)
-    parser.add_argument("--arm", help="irb120, ur5 or large; drawn when not given")
+    parser.add_argument("--arm", help="irb120, ur5, large or kr6; drawn when not given")
     parser.add_argument(
         "--defect", action="append", default=[], help="name, `any`, `outside`, `three`, `eighteen`; may be repeated"
     )

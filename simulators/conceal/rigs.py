@@ -109,6 +109,35 @@ LARGE = Drawing(
     reach_m=2.5,
 )
 
+# KUKA KR AGILUS data sheet, KR 6 R900 sixx; masses shared out of its 52 kg, gears as such arms carry.
+KR6 = Drawing(
+    name="kr6",
+    model="dh",
+    rows=(
+        Row(0.025, -QUARTER, 0.400),
+        Row(0.455, 0.0, 0.0),
+        Row(0.035, -QUARTER, 0.0, -QUARTER),
+        Row(0.0, QUARTER, 0.420),
+        Row(0.0, -QUARTER, 0.0),
+        Row(0.0, 0.0, 0.080, math.pi),
+    ),
+    fixed=(),
+    flange=NO_POSE,
+    lower_rad=_rad(-170, -190, -120, -185, -120, -350),
+    upper_rad=_rad(170, 45, 156, 185, 120, 350),
+    mass_kg=(13.0, 14.0, 9.0, 6.0, 2.0, 0.5),
+    com_m=(
+        (-0.01, 0.08, 0.0),
+        (-0.23, 0.0, 0.02),
+        (-0.02, 0.0, 0.01),
+        (0.0, 0.15, 0.0),
+        (0.0, 0.0, 0.01),
+        (0.0, 0.0, -0.01),
+    ),
+    gear_ratio=(100.0, 100.0, 100.0, 80.0, 80.0, 51.0),
+    reach_m=0.9,
+)
+
 # Huang Kui et al., error simulation of a flexible arm coordinate measuring machine: the reference arm. No drives.
 CYCLE_BACK = (-1.2091995761561452, -1.2091995761561452, -1.2091995761561452)  # 120 deg about (1, 1, 1)
 CYCLE_ON = (1.2091995761561452, 1.2091995761561452, 1.2091995761561452)
@@ -134,6 +163,7 @@ ARM_CMM = Drawing(
 )
 
 ROBOTS = (IRB120, UR5, LARGE)
+BY_NAME = (*ROBOTS, KR6)  # what is drawn stays as it was: published seeds are of these three
 
 
 Floats = NDArray[np.float64]
@@ -201,7 +231,7 @@ def _confused(drawing: Drawing) -> Drawing:
 def _choose_arm(wanted: Wanted, rng: np.random.Generator) -> Drawing:
     if wanted.family == "cones":
         return ARM_CMM
-    names = {drawing.name: drawing for drawing in ROBOTS}
+    names = {drawing.name: drawing for drawing in BY_NAME}
     if wanted.arm is None:
         return ROBOTS[int(rng.integers(len(ROBOTS)))]
     if wanted.arm not in names:
