@@ -14,14 +14,14 @@ from calibrate.identification.rounds import Fitted
 from calibrate.joint_problem import JointProblem
 from calibrate.problem import Problem
 from calibrate.uncertainty.held_out import HeldOut, Proof, held_out
-from calibrate.uncertainty.splits import Split, SplitKind, usual
+from calibrate.uncertainty.splits import Split, SplitKind, same_poses, usual
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Rows = NDArray[np.intp]
 
 POSE = 6  # x, y, z (m), then a turn (rad), which does not add to a length
-FEWEST_ROWS = 15  # below, a fifth held out is two poses and the proof is luck
+FEWEST_POSES = 15  # below, a fifth held out is two poses and the proof is luck
 
 
 @dataclass(frozen=True)
@@ -51,14 +51,15 @@ def proof(fitted: Fitted, before: Fit, splits: tuple[Split, ...]) -> Proven:
 def splits_of(fitted: Fitted, samples: Samples, splitting: Splitting, rng: Generator) -> tuple[Split, ...]:
     """Splits of the joint problem by rows of these samples: unseen is every observation that an unseen row is part of.
 
-    So no row is on both sides. None with too few rows. A known length goes with what only unseen rows know.
+    So no row is on both sides. None with too few poses. A known length goes with what only unseen rows know.
     """
     measured = fitted.weighting.measured
     rows = np.unique(np.concatenate([m.sample_rows.ravel() for m in measured]))
-    if len(rows) < FEWEST_ROWS or splitting.share == 0.0:
+    pose = same_poses(samples.joints()[rows])
+    if pose.max(initial=-1) + 1 < FEWEST_POSES or splitting.share == 0.0:
         return ()
     place, t_s = places_of(samples)[rows], samples.column("t_s")[rows]
-    by_sample = usual(len(rows), rng, place=place, t_s=t_s, share=splitting.share, kinds=splitting.kinds)
+    by_sample = usual(len(rows), rng, place=place, t_s=t_s, pose=pose, share=splitting.share, kinds=splitting.kinds)
     out: list[Split] = []
     for split in by_sample:
         folds = [

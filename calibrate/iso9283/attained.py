@@ -26,12 +26,12 @@ from calibrate.model_file import ModelFile
 from calibrate.physics.predicting import Placed, placed
 from calibrate.predict import Predictor
 from calibrate.rigid import inverse, transform
+from calibrate.uncertainty.splits import CLOSE_RAD, same_poses
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Frame = Literal["fit", "model", "rig"]
 
-CLOSE_RAD = 0.01  # rows whose joints are nearer than this to those of a pose are of it
 JOINTLESS = "no joint angles in the samples"
 FLAT_M = 1e-3  # smallest second extent of the poses by which a frame is fitted: below, they lie on a line
 MOVED_M, MOVED_SHARE = 1e-3, 5.0  # a device that stands elsewhere: error in the model's frame, and over that of a fit
@@ -183,12 +183,7 @@ def _of_plan(given: Floats, number: Ints, plan: PosePlan, wanted: NDArray[np.boo
 def _alike(given: Floats, wanted: NDArray[np.bool_]) -> Ints:
     """(row,) number from 1 of rows with nearly the same joints, in the order in which they first come."""
     out = np.zeros(len(given), dtype=np.int64)
-    first: list[Floats] = []
-    for row in np.flatnonzero(wanted):
-        near = [k for k, one in enumerate(first) if np.max(np.abs(one - given[row])) < CLOSE_RAD]
-        if not near:
-            first.append(given[row])
-        out[row] = near[0] + 1 if near else len(first)
+    out[wanted] = same_poses(given[wanted]) + 1
     return out
 
 
