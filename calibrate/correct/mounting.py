@@ -1,33 +1,39 @@
 """How the real flange lies in the last frame of a model, which no reading of a single target shows.
 
-The start is where the flange of the model lies best on the drawn one. The real one is turned and shifted against it as
-much as any other link of this arm was off, which the model itself shows: errors of its flange over the joint range are
-those of all its links. Targets whose points in the flange are stated show where the real flange is, each as well as all
-of them agree. Both together are one linear Gaussian estimate. Source: C. E. Rasmussen, C. K. I. Williams, Gaussian
-Processes for Machine Learning, 2006, section 2.1.1 (Bayesian linear model).
+What a model knows is where its targets are at every posture. Errors of links, zeros and brackets that are alike to the
+targets are not alike to the flange: which of them it is, is open, and each is as likely as the sizes of errors that the
+targets do show. One linear Gaussian estimate of all of them, given where the model has its targets, under sizes that
+are themselves drawn and weighted by how well they explain it. Sources: C. E. Rasmussen, C. K. I. Williams, Gaussian
+Processes for Machine Learning, 2006, section 2.1.1 (Bayesian linear model); A. B. Owen, Monte Carlo theory, methods and
+examples, 2013, chapter 9 (importance sampling).
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
+from scipy.stats import norm, qmc
 
 from calibrate.arms.rig_arm import RigArm
-from calibrate.physics.predicting import POSTURES, SEED, mean_motion
+from calibrate.physics.predicting import SEED, mean_motion
 from calibrate.predict import Predictor
 from calibrate.rigid import inverse, transform
 from calibrate.sensors.target import point_by_twist
 
 Floats = NDArray[np.float64]
 
-LENGTH_M = 0.2  # shifts count as turns by this: a hand's length
-ROUNDS = 20  # in which the variance of the targets' places settles
-ENOUGH = 150  # postures for six numbers a link
-LEAST_M, LEAST_RAD = 1e-5, 1e-5  # no link is known better than its machining
-PLACED_M = 5e-4  # a bracket mounted by hand, against its drawing
-AGREED_M = 1e-4  # machined nests: what several targets are taken to agree to before they show how well they do
-SEVERAL = 3  # targets: fewer show nothing of how they agree
+POSTURES = 60
+ROUNDS = 3  # of linearising; each draws sizes about those of the one before
+DRAWS = 512  # of the sizes, a power of two
+# Median of one sigma, before anything is known: links in m and rad, zeros in rad, a bracket mounted by hand in m.
+SIZES = (3e-4, 6e-4, 3e-3, 4e-4)
+SPREAD = 1.0  # of their logarithms
+WIDER = 1.5  # what sizes are drawn from, than what is known of them
+EXACT_M = 5e-6  # how well a model is taken to know its targets
+CURVED = 0.02  # of errors that are left: what linearising may miss of them
+# Of a model without targets, points of its last frame, which lies anyhow on the flange, m.
+CORNERS_M = 0.1 * np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,73 +64,153 @@ class Mounting:
 
 def mounting(predictor: Predictor, drawn: RigArm, geometric: RigArm) -> Mounting:
     """Of a model at its values; `geometric` is its arm."""
-    postures = np.random.default_rng(SEED).uniform(drawn.lower_rad, drawn.upper_rad, (POSTURES, drawn.n_joints))
-    frames, real = drawn.frames(postures), geometric.frames(postures)[:, -1]
-    best = mean_motion(real, frames[:, -1])
-    prior = _like_other_links(frames[:ENOUGH], real[:ENOUGH] @ best)
-    stated_m, found_m = _targets(predictor, inverse(best))
-    if not len(stated_m):
-        return Mounting(best, prior, stated_m)
-    J, off_m = point_by_twist(stated_m).reshape(-1, 6), (found_m - stated_m).ravel()
-    placed_m, covariance, twist = PLACED_M, prior, np.zeros(6)
-    for _ in range(ROUNDS if len(stated_m) >= SEVERAL else 1):
-        covariance = np.asarray(np.linalg.inv(np.linalg.inv(prior) + J.T @ J / placed_m**2), dtype=np.float64)
-        twist = covariance @ J.T @ off_m / placed_m**2
-        spent = float(np.trace(J @ covariance @ J.T)) / placed_m**2
-        left = float(np.sum((off_m - J @ twist) ** 2))
-        placed_m = float(np.sqrt((left + AGREED_M**2) / (len(off_m) - spent + 1.0)))
-    return Mounting(best @ transform(twist[:3], twist[3:]), covariance, stated_m)
+    q_rad = np.random.default_rng(SEED).uniform(drawn.lower_rad, drawn.upper_rad, (POSTURES, drawn.n_joints))
+    last = geometric.frames(q_rad)[:, -1]
+    stated_m, found_m = _targets(predictor)
+    placed = len(stated_m) > 0
+    points_m = stated_m if placed else CORNERS_M
+    seen_m = _at(last, found_m if placed else CORNERS_M)
+    errors = _Errors(drawn.frames(q_rad), points_m, placed)
+    x, covariance = np.zeros(errors.count), np.zeros((errors.count, errors.count))
+    size, width = np.log(SIZES), np.full(len(SIZES), SPREAD)
+    for _ in range(ROUNDS):
+        frames, at_m = errors.applied(x)
+        A, left_m = errors.columns(frames, at_m), (seen_m - at_m).ravel()
+        noise_m = max(EXACT_M, CURVED * float(np.sqrt(np.mean(left_m**2))))
+        x, covariance, size, width = _estimate(A, left_m + A @ x, noise_m, errors, (size, width))
+    frames, _ = errors.applied(x)
+    J = errors.of_flange(frames)
+    return Mounting(mean_motion(last, frames[:, -1]), J @ covariance @ J.T, stated_m)
 
 
-def _targets(predictor: Predictor, back: Floats) -> tuple[Floats, Floats]:
-    """(target, 3) as stated in the flange, and as found, brought there by `back`."""
+def _targets(predictor: Predictor) -> tuple[Floats, Floats]:
+    """(target, 3) as stated in the flange, and as found in the model's last frame."""
     rig = predictor.rig
     stated = {f"target{k}": t.point_m for k, t in rig.targets.items()}
     stated |= {"tool": rig.tool.point_m} if rig.tool.point_m is not None else {}
     held = [(name, point) for name, point in stated.items() if f"{name}.x" in predictor.values]
-    start = [np.array(predictor.about.get(name, point)[:3]) for name, point in held]
-    shift = [[predictor.values.get(f"{name}.{a}", 0.0) for a in "xyz"] for name, _ in held]
     if not held:
         return np.zeros((0, 3)), np.zeros((0, 3))
-    found = np.array(start) + np.array(shift)
-    return np.array([point for _, point in held]), found @ back[:3, :3].T + back[:3, 3]
+    start = [np.array(predictor.about.get(name, point)[:3]) for name, point in held]
+    shift = [[predictor.values.get(f"{name}.{a}", 0.0) for a in "xyz"] for name, _ in held]
+    return np.array([point for _, point in held]), np.array(start) + np.array(shift)
 
 
-def _like_other_links(frames: Floats, T_real: Floats) -> Floats:
-    """(6, 6) variance of the last link's shift and turn: about its joint's axis as the zeros of the other joints are
-    off, across as their links are; from frames (pose, joint + 1, 4, 4) of the drawn arm and real flanges (pose, 4, 4).
+def _at(T: Floats, points_m: Floats) -> Floats:
+    """(pose, point, 3) in the base, of points (point, 3) of frames (pose, 4, 4)."""
+    return points_m @ np.swapaxes(T[:, :3, :3], 1, 2) + T[:, None, :3, 3]
 
-    Each link is given a small motion behind its joint, the shortest that makes the flange err as it does. What poses
-    do not separate is shared out by it, hence each variance is divided by how much of it the poses show.
+
+@dataclass(frozen=True, eq=False)
+class _Errors:
+    """Small errors of a drawn arm: the base's six, a zero and six of its link for each joint, and of the points.
+
+    `drawn` (pose, joint + 1, 4, 4) frames. Points (point, 3) of the flange are off by three numbers each if `placed`,
+    else all by one motion. Where the base is, and this motion, nothing is known of beforehand: they are flat.
     """
-    off = T_real @ inverse(frames[:, -1])
-    turn, shift_m = Rotation.from_matrix(off[:, :3, :3]).as_rotvec(), T_real[:, :3, 3] - frames[:, -1, :3, 3]
-    n = frames.shape[1] - 1
-    base = np.broadcast_to(np.eye(4), frames[:, 0].shape)  # its motion, and the flange's own, are no links' errors
-    bodies = (base, *(frames[:, k] for k in range(1, n)), frames[:, -1])
-    A = np.concatenate([_moves(B, frames[:, -1, :3, 3]) for B in bodies], axis=2).reshape(-1, 6 * len(bodies))
-    y = np.concatenate([shift_m / LENGTH_M, turn], axis=1).ravel()
-    pinv = np.asarray(np.linalg.pinv(A, rcond=1e-9), dtype=np.float64)
-    found, shown = pinv @ y, np.einsum("ij,ji->i", pinv, A)
-    each, part = found[6:-6].reshape(n - 1, 6) ** 2, shown[6:-6].reshape(n - 1, 6)
-    length_m = max(LENGTH_M * float(np.sqrt(each[:, :3].sum() / part[:, :3].sum())), LEAST_M)
-    across, about = (
-        max(float(np.sqrt(each[:, axes].sum() / part[:, axes].sum())), LEAST_RAD) for axes in ((3, 4), (5,))
-    )
-    axis = inverse(frames[:1, -1])[0, :3, :3] @ frames[0, n - 1, :3, 2]
-    spin = np.outer(axis, axis)
-    out = np.zeros((6, 6))
-    out[:3, :3] = length_m**2 * np.eye(3)
-    out[3:, 3:] = across**2 * (np.eye(3) - spin) + about**2 * spin
-    return out
+
+    drawn: Floats
+    points_m: Floats
+    placed: bool
+
+    @property
+    def joints(self) -> int:
+        return self.drawn.shape[1] - 1
+
+    @property
+    def count(self) -> int:
+        return 6 + 7 * self.joints + (self.points_m.size if self.placed else 6)
+
+    @property
+    def flat(self) -> NDArray[np.bool_]:
+        """(error,) whether nothing is known of it beforehand."""
+        n = np.arange(self.count)
+        return (n < 6) | (not self.placed and n >= self.count - 6)
+
+    def sizes(self, size: Floats) -> Floats:
+        """(draw, error) one sigma of each that is not flat, under sizes (draw, 4)."""
+        length, angle, zero, placed = size.T[:, :, None]
+        link = np.concatenate([zero, *3 * (length,), *3 * (angle,)], axis=1)
+        points = np.repeat(placed, self.points_m.size if self.placed else 0, axis=1)
+        return np.concatenate([np.tile(link, self.joints), points], axis=1)
+
+    def applied(self, x: Floats) -> tuple[Floats, Floats]:
+        """(pose, joint + 1, 4, 4) frames with errors (error,), and (pose, point, 3) of the points in the base."""
+        T = transform(x[:3], x[3:6]) @ self.drawn[:, 0]
+        out = [T]
+        for k, part in enumerate(x[6 : 6 + 7 * self.joints].reshape(-1, 7)):
+            turned = transform(np.zeros(3), np.array([0.0, 0.0, part[0]]))
+            T = T @ turned @ inverse(self.drawn[:, k]) @ self.drawn[:, k + 1] @ transform(part[1:4], part[4:])
+            out.append(T)
+        off = x[6 + 7 * self.joints :]
+        if self.placed:
+            return np.stack(out, axis=1), _at(T, self.points_m + off.reshape(-1, 3))
+        return np.stack(out, axis=1), _at(T @ transform(off[:3], off[3:]), self.points_m)
+
+    def columns(self, frames: Floats, at_m: Floats) -> Floats:
+        """(pose x point x 3, error) how the points move in the base."""
+        moves = np.stack([self._moves(frames, at_m[:, k]) for k in range(at_m.shape[1])], axis=1)
+        shift = moves[..., :3, :]
+        if self.placed:
+            own = np.zeros((*shift.shape[:3], self.points_m.size))
+            for k in range(len(self.points_m)):
+                own[:, k, :, 3 * k : 3 * k + 3] = frames[:, -1, :3, :3]
+        else:
+            own = shift[..., -6:]
+        return np.concatenate([shift, own], axis=-1).reshape(-1, self.count)
+
+    def of_flange(self, frames: Floats) -> Floats:
+        """(6, error) shift and turn of the flange in its own axes, the mean over the poses."""
+        moves = self._moves(frames, frames[:, -1, :3, 3]).reshape(len(frames), 2, 3, -1)
+        own = np.mean(np.einsum("pji,pkje->pkie", frames[:, -1, :3, :3], moves), axis=0).reshape(6, -1)
+        return np.pad(own, ((0, 0), (0, self.count - own.shape[1])))
+
+    def _moves(self, frames: Floats, point_m: Floats) -> Floats:
+        """(pose, 6, error) shift and turn in the base, by errors of base and arm, of a body at points (pose, 3)."""
+        base = _by_twist(np.broadcast_to(np.eye(4), frames[:, 0].shape), point_m)
+        out = [base]
+        for k in range(self.joints):
+            out += [_by_twist(frames[:, k], point_m)[:, :, 5:], _by_twist(frames[:, k + 1], point_m)]
+        return np.concatenate(out, axis=2)
 
 
-def _moves(B: Floats, point_m: Floats) -> Floats:
-    """(pose, 6, 6) how a flange at `point_m` (pose, 3) moves and turns by a shift, in hands, and a turn of a frame B
-    (pose, 4, 4), in its axes.
-    """
-    R, out = B[:, :3, :3], np.zeros((len(B), 6, 6))
-    lever = point_m - B[:, :3, 3]
+def _by_twist(T: Floats, point_m: Floats) -> Floats:
+    """(pose, 6, 6) shift and turn in the base of a body at points (pose, 3), by a twist of frames (pose, 4, 4)."""
+    R, out = T[:, :3, :3], np.zeros((len(T), 6, 6))
     out[:, :3, :3] = out[:, 3:, 3:] = R
-    out[:, :3, 3:] = np.cross(np.swapaxes(R, 1, 2), lever[:, None, :]).swapaxes(1, 2) / LENGTH_M
+    out[:, :3, 3:] = np.cross(np.swapaxes(R, 1, 2), (point_m - T[:, :3, 3])[:, None, :]).swapaxes(1, 2)
     return out
+
+
+def _estimate(
+    A: Floats, y: Floats, noise_m: float, errors: _Errors, sizes: tuple[Floats, Floats]
+) -> tuple[Floats, Floats, Floats, Floats]:
+    """Errors (error,) and their covariance, logarithms of the sizes (4,) and their spread (4,).
+
+    Of readings y (row,) that errors move by A (row, error). `sizes` are drawn about the first as wide as the second.
+    """
+    flat, (size, width) = errors.flat, sizes
+    normal = norm.ppf(qmc.Sobol(len(size), rng=SEED).random(DRAWS))
+    drawn = size + width * normal
+    sigma = errors.sizes(np.exp(drawn))  # (draw, error)
+    Q, _ = np.linalg.qr(A[:, flat])
+    own = A[:, ~flat] - Q @ (Q.T @ A[:, ~flat])
+    gram, by_y = own.T @ own / noise_m**2, own.T @ (y - Q @ (Q.T @ y)) / noise_m**2
+    # With errors in units of their sigma, priors are 1 whatever the sizes.
+    M = sigma[:, :, None] * gram * sigma[:, None, :] + np.eye(len(by_y))
+    C = np.linalg.inv(M)
+    found = np.einsum("dij,dj->di", C, sigma * by_y)
+    likely = 0.5 * (np.einsum("di,di->d", found, sigma * by_y) - np.linalg.slogdet(M)[1])
+    likely += 0.5 * np.sum(normal**2 - ((drawn - np.log(SIZES)) / SPREAD) ** 2, axis=1)
+    weight = np.exp(likely - likely.max())
+    weight /= weight.sum()
+    mean, each = weight @ drawn, sigma * found
+    best = weight @ each
+    covariance = np.einsum("d,di,dij,dj->ij", weight, sigma, C, sigma, optimize=True)
+    covariance += np.einsum("d,di,dj->ij", weight, each - best, each - best, optimize=True)
+    # What is flat follows from the others.
+    follows = np.zeros((len(flat), len(best)))
+    follows[~flat], follows[flat] = np.eye(len(best)), -np.linalg.lstsq(A[:, flat], A[:, ~flat])[0]
+    x = follows @ best
+    x[flat] += np.linalg.lstsq(A[:, flat], y)[0]
+    return x, follows @ covariance @ follows.T, mean, WIDER * np.sqrt(weight @ (drawn - mean) ** 2)

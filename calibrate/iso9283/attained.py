@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from acquisition.recording import Samples
+from acquisition.recording import Samples, readings_sha256
 from acquisition.recording.pose_plan import PosePlan
 from acquisition.recording.rig import Rig
 from acquisition.recording.samples import ORIENTATION, POSITION
@@ -32,6 +32,10 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Frame = Literal["fit", "model", "rig"]
 
+SAME_DATA = (
+    "same data: the model was fitted to these very readings, so what it predicts of them and their correction would "
+    "prove nothing; evaluate a test that it has not seen"
+)
 JOINTLESS = "no joint angles in the samples"
 FLAT_M = 1e-3  # smallest second extent of the poses by which a frame is fitted: below, they lie on a line
 MOVED_M, MOVED_SHARE = 1e-3, 5.0  # a device that stands elsewhere: error in the model's frame, and over that of a fit
@@ -39,7 +43,10 @@ MOVED_M, MOVED_SHARE = 1e-3, 5.0  # a device that stands elsewhere: error in the
 
 @dataclass(frozen=True, eq=False)
 class EvaluatedTest:
-    """Figures of a recording. `predicted` and `corrected` need a model: AP that it predicts, and all with its help."""
+    """Figures of a recording. `predicted` and `corrected` need a model: AP that it predicts, and all with its help.
+
+    Neither is given of the readings that the model was fitted to.
+    """
 
     rows: int
     frame: Frame | Literal["device"]  # device: as measured, for nobody knows what was commanded
@@ -69,6 +76,7 @@ def evaluate(
     target point or poses are missing.
     """
     chosen: Frame = frame or ("fit" if known is None else "model")
+    of_these = known is not None and known.readings_sha256 == readings_sha256(samples)
     samples = samples.take(np.argsort(samples.column("t_s"), kind="stable"))
     sent = _commanded(samples, rig, plan)
     part = samples.take(sent.rows)
@@ -86,7 +94,9 @@ def evaluate(
     turn = None if turned is None else _off_rad(device[:3, :3] @ turned, wanted[:, :3, :3])
     measured = AttainedPoses(sent.pose, side, t_s, wanted_m, attained_m, turn)
     notes = (*sent.notes, *notes)
-    if known is None:
+    if of_these:
+        notes = (*notes, SAME_DATA)
+    if known is None or of_these:
         return EvaluatedTest(len(part), chosen, performance_of(measured), {}, None, notes)
     by_model = placed(known, _at(part, sent.q_rad))
     aligned = _device(chosen, rig, known, by_model.tip_m, seen_m)

@@ -211,6 +211,7 @@ def draw_rig(wanted: Wanted, rng: np.random.Generator) -> DrawnRig:
     if rng.random() < 0.15:
         shown = replace(shown, mass_kg=(), com_m=())
     spread = _spread(full, rng)
+    spread = spread if wanted.placed_m is None else replace(spread, tool_m=wanted.placed_m)
     arm = _believed_arm(full, rng)
     if wanted.family == "dual-psd":
         believed, true = _with_fixture(arm, full, wanted.places, spread, rng)

@@ -73,5 +73,6 @@ class Wanted:
     thermometer_k: float = 0.0  # by which a room thermometer drifts; nothing depends on it. Not 0: it is recorded
     at_least: float = 0.0  # effect over noise of each defect, or the seed is refused
     targets: int = 1  # of a tracker, on the flange, read in turn
+    placed_m: float | None = None  # one sigma of where they sit about their drawing; None: as brackets by hand do
     six_d: bool = False  # a tracker reads the orientation of its target, too
     beside: Beside | None = None  # a simulation of the same plan is recorded, too; tracker, rig file in rows

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from acquisition.recording import Samples
+from acquisition.recording import Samples, readings_sha256
 from acquisition.recording.pose_plan import PlannedBlock, PlannedPose, PosePlan
 from acquisition.recording.rig import parse_rig
 from calibrate.correct.corrected import Options, Wanted, correct
@@ -43,6 +43,15 @@ def test_the_model_predicts_the_accuracy_and_its_correction_leaves_only_scatter(
         assert abs(one.accuracy_m.value - true_error_m(one.pose)) < 5.0 * one.accuracy_m.sigma
         assert better.accuracy_m.value < 3e-5
         assert better.repeatability_m.value == pytest.approx(one.repeatability_m.value, rel=1e-6)
+
+
+def test_a_model_corrects_no_test_that_it_was_fitted_to():
+    samples = seen(Q[POSE - 1], POSE, RNG_OFF_M)
+    own = evaluate(samples, RIG_HERE, known(readings_sha256=readings_sha256(samples)))
+    assert own.corrected is None
+    assert not own.predicted_m
+    assert any(note.startswith("same data") for note in own.notes)
+    assert own.measured == evaluate(samples, RIG_HERE, known()).measured
 
 
 def test_a_fitted_frame_absorbs_where_the_device_stands_and_no_distance():

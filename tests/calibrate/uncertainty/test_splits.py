@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from calibrate.uncertainty.splits import SplitKind, at_random, by_place, last_block, usual
+from calibrate.uncertainty.splits import SplitKind, at_random, by_place, last_block, same_poses, usual
 
 
 def test_a_random_fifth_is_another_one_with_another_seed():
@@ -37,3 +37,19 @@ def test_one_place_is_no_split_by_place():
     assert len(usual(10, rng)) == 1
     assert len(usual(10, rng, place=np.ones(10, dtype=int), t_s=np.arange(10.0))) == 2
     assert len(usual(10, rng, place=np.arange(10) % 2, t_s=np.arange(10.0))) == 3
+
+
+def test_rows_of_one_pose_are_unseen_together():
+    """Six poses, three visits each: a pose that was visited before is not unseen."""
+    pose, t_s = np.tile(np.arange(6), 3), np.arange(18.0)
+    for split in usual(18, np.random.default_rng(2), t_s=t_s, pose=pose):
+        (unseen,) = split.unseen
+        assert set(pose[unseen].tolist()).isdisjoint(np.delete(pose, unseen).tolist())
+        assert 3 <= len(unseen) <= 6
+    (last,) = last_block(t_s, 1.0 / 6.0, pose).unseen
+    assert set(pose[last].tolist()) == {5}  # the one that first came last
+
+
+def test_a_pose_is_known_by_its_joints():
+    q_rad = np.array([[0.1, 0.2], [1.0, 0.2], [0.105, 0.195], [np.nan, 0.0], [1.0, 0.2], [np.nan, 0.0]])
+    assert same_poses(q_rad).tolist() == [0, 1, 0, 2, 1, 3]
