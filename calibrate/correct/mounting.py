@@ -8,7 +8,6 @@ Processes for Machine Learning, 2006, section 2.1.1 (Bayesian linear model); A. 
 examples, 2013, chapter 9 (importance sampling).
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
