@@ -65,11 +65,11 @@ def mounting(predictor: Predictor, drawn: RigArm, geometric: RigArm) -> Mounting
     """Of a model at its values; `geometric` is its arm."""
     q_rad = np.random.default_rng(SEED).uniform(drawn.lower_rad, drawn.upper_rad, (POSTURES, drawn.n_joints))
     last = geometric.frames(q_rad)[:, -1]
-    stated_m, found_m = _targets(predictor)
-    placed = len(stated_m) > 0
-    points_m = stated_m if placed else CORNERS_M
-    seen_m = _at(last, found_m if placed else CORNERS_M)
-    errors = _Errors(drawn.frames(q_rad), points_m, placed)
+    stated_m, found_m, sigma_m = _targets(predictor)
+    if len(stated_m):
+        seen_m, errors = _at(last, found_m), _Errors(drawn.frames(q_rad), stated_m, sigma_m)
+    else:
+        seen_m, errors = _at(last, CORNERS_M), _Errors(drawn.frames(q_rad), CORNERS_M, None)
     x, covariance = np.zeros(errors.count), np.zeros((errors.count, errors.count))
     size, width = np.log(SIZES), np.full(len(SIZES), SPREAD)
     for _ in range(ROUNDS):
@@ -82,17 +82,18 @@ def mounting(predictor: Predictor, drawn: RigArm, geometric: RigArm) -> Mounting
     return Mounting(mean_motion(last, frames[:, -1]), J @ covariance @ J.T, stated_m)
 
 
-def _targets(predictor: Predictor) -> tuple[Floats, Floats]:
-    """(target, 3) as stated in the flange, and as found in the model's last frame."""
+def _targets(predictor: Predictor) -> tuple[Floats, Floats, Floats]:
+    """(target, 3) as stated in the flange, and as found in the model's last frame; (target,) sigma, NaN: not stated."""
     rig = predictor.rig
-    stated = {f"target{k}": t.point_m for k, t in rig.targets.items()}
-    stated |= {"tool": rig.tool.point_m} if rig.tool.point_m is not None else {}
-    held = [(name, point) for name, point in stated.items() if f"{name}.x" in predictor.values]
+    stated = {f"target{k}": (t.point_m, t.point_sigma_m) for k, t in rig.targets.items()}
+    stated |= {"tool": (rig.tool.point_m, None)} if rig.tool.point_m is not None else {}
+    held = {name: one for name, one in stated.items() if f"{name}.x" in predictor.values}
     if not held:
-        return np.zeros((0, 3)), np.zeros((0, 3))
-    start = [np.array(predictor.about.get(name, point)[:3]) for name, point in held]
-    shift = [[predictor.values.get(f"{name}.{a}", 0.0) for a in "xyz"] for name, _ in held]
-    return np.array([point for _, point in held]), np.array(start) + np.array(shift)
+        return np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0)
+    start = [np.array(predictor.about.get(name, point)[:3]) for name, (point, _) in held.items()]
+    shift = [[predictor.values.get(f"{name}.{a}", 0.0) for a in "xyz"] for name in held]
+    sigma_m = [np.nan if sigma is None else sigma for _, sigma in held.values()]
+    return np.array([point for point, _ in held.values()]), np.array(start) + np.array(shift), np.array(sigma_m)
 
 
 def _at(T: Floats, points_m: Floats) -> Floats:
@@ -104,13 +105,14 @@ def _at(T: Floats, points_m: Floats) -> Floats:
 class _Errors:
     """Small errors of a drawn arm: the base's six, a zero and six of its link for each joint, and of the points.
 
-    `drawn` (pose, joint + 1, 4, 4) frames. Points (point, 3) of the flange are off by three numbers each if `placed`,
-    else all by one motion. Where the base is, and this motion, nothing is known of beforehand: they are flat.
+    `drawn` (pose, joint + 1, 4, 4) frames. Points (point, 3) of the flange are off by three numbers each, whose sigma
+    (point,) is NaN where nobody has stated it; without sigmas all by one motion. Where the base is, and this motion,
+    nothing is known of beforehand: they are flat.
     """
 
     drawn: Floats
     points_m: Floats
-    placed: bool
+    sigma_m: Floats | None
 
     @property
     def joints(self) -> int:
@@ -118,20 +120,23 @@ class _Errors:
 
     @property
     def count(self) -> int:
-        return 6 + 7 * self.joints + (self.points_m.size if self.placed else 6)
+        return 6 + 7 * self.joints + (6 if self.sigma_m is None else self.points_m.size)
 
     @property
     def flat(self) -> NDArray[np.bool_]:
         """(error,) whether nothing is known of it beforehand."""
         n = np.arange(self.count)
-        return (n < 6) | (not self.placed and n >= self.count - 6)
+        return (n < 6) | ((n >= self.count - 6) & (self.sigma_m is None))
 
     def sizes(self, size: Floats) -> Floats:
         """(draw, error) one sigma of each that is not flat, under sizes (draw, 4)."""
         length, angle, zero, placed = size.T[:, :, None]
         link = np.concatenate([zero, *3 * (length,), *3 * (angle,)], axis=1)
-        points = np.repeat(placed, self.points_m.size if self.placed else 0, axis=1)
-        return np.concatenate([np.tile(link, self.joints), points], axis=1)
+        arm = np.tile(link, self.joints)
+        if self.sigma_m is None:
+            return arm
+        points = np.where(np.isnan(self.sigma_m), placed, self.sigma_m)
+        return np.concatenate([arm, np.repeat(points, 3, axis=1)], axis=1)
 
     def applied(self, x: Floats) -> tuple[Floats, Floats]:
         """(pose, joint + 1, 4, 4) frames with errors (error,), and (pose, point, 3) of the points in the base."""
@@ -142,7 +147,7 @@ class _Errors:
             T = T @ turned @ inverse(self.drawn[:, k]) @ self.drawn[:, k + 1] @ transform(part[1:4], part[4:])
             out.append(T)
         off = x[6 + 7 * self.joints :]
-        if self.placed:
+        if self.sigma_m is not None:
             return np.stack(out, axis=1), _at(T, self.points_m + off.reshape(-1, 3))
         return np.stack(out, axis=1), _at(T @ transform(off[:3], off[3:]), self.points_m)
 
@@ -150,7 +155,7 @@ class _Errors:
         """(pose x point x 3, error) how the points move in the base."""
         moves = np.stack([self._moves(frames, at_m[:, k]) for k in range(at_m.shape[1])], axis=1)
         shift = moves[..., :3, :]
-        if self.placed:
+        if self.sigma_m is not None:
             own = np.zeros((*shift.shape[:3], self.points_m.size))
             for k in range(len(self.points_m)):
                 own[:, k, :, 3 * k : 3 * k + 3] = frames[:, -1, :3, :3]

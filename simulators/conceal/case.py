@@ -333,7 +333,9 @@ def conceal(wanted: Wanted) -> Case:
     return Case(
         wanted,
         drawn,
-        replace(believe(wanted, drawn, distances, sigma_m, plan_rng), targets_m=targets_m),
+        replace(
+            believe(wanted, drawn, distances, sigma_m, plan_rng), targets_m=targets_m, targets_sigma_m=wanted.placed_m
+        ),
         table,
         posture_rad,
         hidden,

@@ -92,6 +92,7 @@ class Belief:
     tolerance: Mapping[str, float]  # empty: the file has none
     encoder_side: str = ""  # of all second encoders, as the file states; empty: it does not
     targets_m: Floats | None = None  # (target, 3) of several, as assumed
+    targets_sigma_m: float | None = None  # as stated of each
 
 
 def rig_document(belief: Belief) -> dict[str, Any]:
@@ -103,7 +104,9 @@ def rig_document(belief: Belief) -> dict[str, Any]:
             joint["encoder_side"] = belief.encoder_side
     document["tool"] = _tool(belief)
     if belief.targets_m is not None:
-        document["target"] = [{"id": k, "point_m": point} for k, point in enumerate(belief.targets_m.tolist(), start=1)]
+        known = {} if belief.targets_sigma_m is None else {"point_sigma_m": belief.targets_sigma_m}
+        points = enumerate(belief.targets_m.tolist(), start=1)
+        document["target"] = [{"id": k, "point_m": point} | known for k, point in points]
     instrument = belief.rig.instrument
     if isinstance(instrument, DualPsd):
         document["fixture"] = {

@@ -137,10 +137,14 @@ class Tool(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class FlangeTarget(Struct, frozen=True, forbid_unknown_fields=True):
-    """One of several targets (reflectors) on the flange: where it sits in the flange frame."""
+    """One of several targets (reflectors) on the flange: where it sits in the flange frame.
+
+    `point_sigma_m`: how well this is known, a coordinate, where it was measured; None: as a bracket is mounted by hand.
+    """
 
     id: Identity
     point_m: ArmVector
+    point_sigma_m: SigmaMetres | None = None
 
 
 class Fixture(Struct, frozen=True, forbid_unknown_fields=True):

@@ -17,13 +17,15 @@ LINKS = {"link1.length": 5e-4, "link2.length": -6e-4, "link3.length": 4e-4, "lin
 POINTS_M = np.array([[0.1, 0.0, 0.02], [-0.05, 0.09, 0.02], [-0.05, -0.09, 0.05], [0.0, 0.0, 0.15]])
 
 
-def flange(targets_m=None, off=None, seed=1):
+def flange(targets_m=None, off=None, seed=1, more=""):
     """Of an arm whose zeros are off by `ZERO_RAD`; `targets_m` (target, 3) as stated, of a flange that is `off`."""
     rng = np.random.default_rng(seed)
     values = dict(zip(NAMES, ZERO_RAD * rng.choice([-1.0, 1.0], 5), strict=True)) | LINKS
     text = RIG
     if targets_m is not None:
-        text += "".join(f"\n[[target]]\nid = {k}\npoint_m = {p.tolist()}\n" for k, p in enumerate(targets_m, start=1))
+        text += "".join(
+            f"\n[[target]]\nid = {k}\npoint_m = {p.tolist()}\n{more}" for k, p in enumerate(targets_m, start=1)
+        )
     rig: Rig = parse_rig(text, "rig.toml")
     drawn = RigArm.of_rig(rig)
     bare = mounting(Predictor(rig, values, {}, ("position",)), drawn, RigArm.of_rig(rig, values))
@@ -63,3 +65,12 @@ def test_targets_that_agree_with_each_other_show_the_flange():
     assert Rotation.from_matrix(found.T[:3, :3].T @ true[:3, :3]).magnitude() < 1e-3
     assert found.sigma_rad < 0.3 * bare.sigma_rad
     assert found.lever_m(POINTS_M[0] + [0.0, 0.0, 0.03]) == pytest.approx(0.03)
+
+
+def test_three_targets_are_worth_what_is_stated_of_their_places():
+    """Three points off by 0.1 mm or so agree by chance; stated to be measured, they show the flange better."""
+    off, three = turned([1e-3, -2e-3, 5e-3], [4e-4, -3e-4, 2e-4]), POINTS_M[:3]
+    (by_hand, _), (measured, true) = (flange(three, off, more=more) for more in ("", "point_sigma_m = 2e-5\n"))
+    assert measured.sigma_rad < 0.3 * by_hand.sigma_rad
+    assert 1e-4 < measured.sigma_rad < 1e-3  # 20 um over 0.1 m
+    assert Rotation.from_matrix(measured.T[:3, :3].T @ true[:3, :3]).magnitude() < 3.0 * measured.sigma_rad
