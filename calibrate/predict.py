@@ -60,6 +60,19 @@ class Predictor:
         """(pose, 3) target or probe tip in the base, for flange poses (pose, 4, 4)."""
         return self._target.in_base(self.values_of(self._target.parameters), T_base_flange)
 
+    def found_m(self, name: str, stated_m: tuple[float, ...]) -> Floats:
+        """(3,) in the flange, of the target of this name ("tool", "target1" ...), which the rig file states there."""
+        shift = [self.values.get(f"{name}.{axis}", 0.0) for axis in "xyz"]
+        return np.array(self.about.get(name, stated_m)[:3]) + np.array(shift)
+
+    def measured_at(self, T_base_flange: Floats) -> Floats:
+        """(pose, 3) a point that was measured, in the base: the tip, or the first of several targets."""
+        for k, target in self.rig.targets.items():
+            if f"target{k}.x" in self.values:
+                point_m = self.found_m(f"target{k}", target.point_m)
+                return T_base_flange[:, :3, :3] @ point_m + T_base_flange[:, :3, 3]
+        return self.tip_at(T_base_flange)
+
     @cached_property
     def T_base_device(self) -> Floats:
         """(4, 4) the measuring device. DataError where neither model nor rig knows a place."""

@@ -90,10 +90,9 @@ def _targets(predictor: Predictor) -> tuple[Floats, Floats, Floats]:
     held = {name: one for name, one in stated.items() if f"{name}.x" in predictor.values}
     if not held:
         return np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0)
-    start = [np.array(predictor.about.get(name, point)[:3]) for name, (point, _) in held.items()]
-    shift = [[predictor.values.get(f"{name}.{a}", 0.0) for a in "xyz"] for name in held]
+    found_m = [predictor.found_m(name, point) for name, (point, _) in held.items()]
     sigma_m = [np.nan if sigma is None else sigma for _, sigma in held.values()]
-    return np.array([point for point, _ in held.values()]), np.array(start) + np.array(shift), np.array(sigma_m)
+    return np.array([point for point, _ in held.values()]), np.array(found_m), np.array(sigma_m)
 
 
 def _at(T: Floats, points_m: Floats) -> Floats:

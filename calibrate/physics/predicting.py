@@ -55,7 +55,7 @@ class OwnFrame:
         low, high = np.array([j.lower_rad for j in joints]), np.array([j.upper_rad for j in joints])
         q_rad = np.random.default_rng(SEED).uniform(low, high, (POSTURES, len(joints)))
         flange = predictor.flange(q_rad)
-        tip_m = predictor.tip_at(flange)
+        tip_m = predictor.measured_at(flange)
         rigid = np.concatenate([np.tile(np.eye(3), (POSTURES, 1, 1)), -cross_matrix(tip_m)], axis=2)
         pinv = np.asarray(np.linalg.pinv(rigid.reshape(-1, 6)), dtype=np.float64)
         return cls(predictor, q_rad, tip_m, pinv, flange)
@@ -64,7 +64,7 @@ class OwnFrame:
         """(4, 4) that brings the arm at values near the known ones best onto the known one, to first order."""
         if other is self.known:
             return np.eye(4)
-        v = self.twist @ (other.tip_m(self.q_rad) - self.tip_m).ravel()
+        v = self.twist @ (other.measured_at(other.flange(self.q_rad)) - self.tip_m).ravel()
         return transform(-v[:3], -v[3:])
 
     def flange_back(self, other: Predictor, back: Floats) -> Floats:
