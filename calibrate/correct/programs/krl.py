@@ -6,7 +6,8 @@ targets of PTP, LIN, SPTP and SLIN and declared points; tools, bases and relativ
 
 import re
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 
 from calibrate.correct.corrected import Branch
 from calibrate.correct.programs import literal
+from calibrate.correct.programs.stated_frames import Event, Used, calls_of, set_above, words_of
 from calibrate.correct.rotations import KUKA
 
 Floats = NDArray[np.float64]
@@ -36,16 +38,27 @@ DECLARED = re.compile(
 MOVE = re.compile(rf"^[ \t]*S?(?:PTP|LIN|CIRC)\s+(?P<target>{NAME})", re.IGNORECASE | re.MULTILINE)
 ARC_END = re.compile(rf"{ARC}(?P<target>{NAME})", re.IGNORECASE | re.MULTILINE)
 OTHER = re.compile(r"^[ \t]*S?(?:PTP_REL|LIN_REL|CIRC_REL)\b", re.IGNORECASE | re.MULTILINE)
-ROUTINE = re.compile(r"^[ \t]*(?:GLOBAL\s+)?DEF(?:FCT\s+\w+)?\s+(?P<routine>\w+)\s*\(", re.IGNORECASE | re.MULTILINE)
+ROUTINE = re.compile(
+    r"^[ \t]*(?:GLOBAL\s+)?DEF(?:FCT\s+\w+)?\s+(?P<name>\w+)\s*\((?P<parameters>[^)]*)",
+    re.IGNORECASE | re.MULTILINE,
+)
+WAY = re.compile(
+    r"^[ \t]*(?:(?P<loop>FOR|WHILE|REPEAT|LOOP)|(?P<if>IF|SWITCH)|(?P<scope>(?:PTP_)?SPLINE)|(?P<else>CASE)"
+    r"|(?P<otherwise>ELSE|DEFAULT)|(?P<end>END(?:FOR|WHILE|LOOP|IF|SWITCH|SPLINE)|UNTIL)|(?P<leave>END(?:FCT)?)"
+    r"|(?P<return>RETURN)|(?P<break>EXIT))\b",
+    re.IGNORECASE | re.MULTILINE,
+)
 SET = re.compile(
-    r"\$(?P<what>BASE|TOOL)(?:\.\w+)?\s*=\s*(?P<value>[^\n]*)|\bBAS\s*\(\s*#(?P<kind>BASE|TOOL)\s*,\s*(?P<number>\w+)\s*\)"
-    r"|\bFDAT_ACT\s*=\s*(?P<inline>\w+)",
+    r"\$(?P<what>BASE|TOOL)(?:\.\w+)?[ \t]*=(?!=)[ \t]*(?P<value>[^\n]*)"
+    r"|\bBAS\s*\(\s*#(?P<kind>BASE|TOOL)\s*,\s*(?P<number>\w+)\s*\)|\bFDAT_ACT\s*=\s*(?P<inline>\w+)",
     re.IGNORECASE,
 )
-HELD = re.compile(rf"(?<!\w)(?P<name>\$?\w+(?:[ \t]*\[[ \t]*\d+[ \t]*\])?)\s*=\s*{AGGREGATE}", re.IGNORECASE)
+HELD = re.compile(rf"(?<!\w)(?P<name>\$?\w+(?:[ \t]*\[[ \t]*\d+[ \t]*\])?)\s*=\s*{AGGREGATE}(?!\s*:)", re.IGNORECASE)
 INLINE_DATA = re.compile(r"\bFDAT\s+(?P<name>\w+)\s*=\s*\{(?P<fields>[^{}]*)\}", re.IGNORECASE)
+CHANGED = re.compile(r"(?<![\w$.])(?P<name>\$?\w+(?:[ \t]*\[[ \t]*\d+[ \t]*\])?)(?:\.\w+)*[ \t]*=(?!=)", re.IGNORECASE)
+CHOSEN = re.compile(r"\[(?!\d+\])")  # an index that is no number
+INLINE_FORM = re.compile(r"S(?:BASE|TOOL2?)\s*\(\s*(?P<name>\w+)\s*\)\s*", re.IGNORECASE)
 FIXED = re.compile(r"\$IPO_MODE\s*=\s*#TCP|IPO_FRAME\s+#TCP", re.IGNORECASE)
-Used = tuple[literal.NamedPose, literal.NamedPose]  # base and tool
 POSE = ("X", "Y", "Z", "A", "B", "C")
 
 
@@ -124,15 +137,48 @@ def _turn(span: literal.Span, number: float) -> tuple[Branch, literal.Turns]:
     return asked, turns
 
 
-def _places(code: str) -> tuple[literal.Places, dict[str, tuple[literal.NamedPose, literal.NamedPose]]]:
-    """Frame and tool of an instruction, as its routine has set them last above; those of inline forms by FDAT name."""
-    held, times = dict[str, Floats](), Counter[str]()
+def _places(code: str) -> tuple[literal.Places, dict[str, Used]]:
+    """Base and tool of an instruction, as the program has set them on its way there; of inline forms by FDAT name."""
+    place = _poses(code)
+    nothing = place("", "")
+    inline = dict[str, Used]()
+    for match in INLINE_DATA.finditer(code):
+        numbers = {key: f"{number:.0f}" for key, (_, number) in _fields(code, *match.span("fields")).items()}
+        base, tool = (place(what, f"{what}_DATA[{numbers.get(what + '_NO')}]") for what in ("BASE", "TOOL"))
+        inline[match["name"].upper()] = (base, tool)
+
+    def given(what: str, value: str) -> literal.NamedPose:
+        form = INLINE_FORM.fullmatch(value)
+        named = inline.get(form["name"].upper()) if form else None
+        return place(what, value) if named is None else named[what == "TOOL"]
+
+    routines = list(ROUTINE.finditer(code))
+    events = [Event(match.start(), match.lastgroup or "") for match in WAY.finditer(code)]
+    events += calls_of(code, routines)
+    for match in routines:
+        events += [
+            Event(match.start(), "leave"),
+            Event(match.start("name"), "routine", match["name"].lower(), words=words_of(match["parameters"])),
+        ]
+    for match in SET.finditer(code):
+        if match["inline"]:
+            unknown = replace(nothing, name=f"FDAT {match['inline']}")
+            poses = inline.get(match["inline"].upper(), (unknown, unknown))
+        else:
+            what = (match["what"] or match["kind"]).upper()
+            pose = given(what, match["value"] or f"{what}_DATA[{match['number']}]")
+            poses = (pose, None) if what == "BASE" else (None, pose)
+        events.append(Event(match.start(), "set", "", poses, words_of(match["value"] or match["number"] or "")))
+    return set_above(events, (nothing, nothing), ("base", "tool")), inline
+
+
+def _poses(code: str) -> Callable[[str, str], literal.NamedPose]:
+    """Of what a base or tool is set to: a frame of the file with one value, or a literal; each is read once."""
+    held, times = dict[str, Floats](), Counter(_key(match["name"]) for match in CHANGED.finditer(code))
     for match in HELD.finditer(code):
-        fields, name = _fields(code, *match.span("fields")), _key(match["name"])
-        times[name] += 1
+        fields = _fields(code, *match.span("fields"))
         if all(key in fields for key in POSE):
-            held[name] = KRL.frame([fields[key][1] for key in POSE])
-    events = sorted((*ROUTINE.finditer(code), *SET.finditer(code)), key=lambda event: event.start())
+            held[_key(match["name"])] = KRL.frame([fields[key][1] for key in POSE])
     fixed = "the tool is stationary (#TCP), which is not corrected" if FIXED.search(code) else ""
 
     @cache
@@ -140,61 +186,14 @@ def _places(code: str) -> tuple[literal.Places, dict[str, tuple[literal.NamedPos
         name = _key(value)
         if name in ("$NULLFRAME", "$WORLD", f"{what}_DATA[0]"):
             return literal.NamedPose(name, np.eye(4), fixed)
-        fields = _fields(value, 0, len(value)) if value.lstrip().startswith("{") else {}
-        if all(key in fields for key in POSE):
-            return literal.NamedPose(f"${what}", KRL.frame([fields[key][1] for key in POSE]), fixed)
-        return literal.NamedPose(name, held.get(name) if times[name] == 1 else None, fixed)
+        if literal_pose := re.fullmatch(AGGREGATE, value.strip(), re.IGNORECASE):
+            fields = _fields(value, *literal_pose.span("fields"))
+            if all(key in fields for key in POSE):
+                return literal.NamedPose(f"${what}", KRL.frame([fields[key][1] for key in POSE]), fixed)
+        chosen = f"the pose of {name} is chosen while the program runs" if CHOSEN.search(name) else ""
+        return literal.NamedPose(name, held.get(name) if times[name] == 1 else None, fixed or chosen)
 
-    inline = dict[str, tuple[literal.NamedPose, literal.NamedPose]]()
-    for match in INLINE_DATA.finditer(code):
-        numbers = {key: f"{number:.0f}" for key, (_, number) in _fields(code, *match.span("fields")).items()}
-        base, tool = (place(what, f"{what}_DATA[{numbers.get(what + '_NO')}]") for what in ("BASE", "TOOL"))
-        inline[match["name"].upper()] = (base, tool)
-
-    nothing: Used = (literal.NamedPose(refused=fixed), literal.NamedPose(refused=fixed))
-    starts = [event.start() for event in events]
-
-    def states(entered: Mapping[str, Used]) -> list[Used]:
-        out, (base, tool) = list[Used](), nothing
-        for event in events:
-            if event.re is ROUTINE:
-                base, tool = entered.get(event["routine"].lower(), nothing)
-            elif event["inline"]:
-                unknown = (literal.NamedPose(f"FDAT {event['inline']}", None, fixed),) * 2
-                base, tool = inline.get(event["inline"].upper(), unknown)
-            else:
-                what = (event["what"] or event["kind"]).upper()
-                pose = place(what, event["value"] or f"{what}_DATA[{event['number']}]")
-                base, tool = (pose, tool) if what == "BASE" else (base, pose)
-            out.append((base, tool))
-        return out
-
-    alone = states({})
-    entered = {
-        event["routine"].lower(): uses[0]
-        for event in events
-        if event.re is ROUTINE
-        and (uses := [literal.last_before(alone, starts, at, nothing) for at in _calls(code, event["routine"])])
-        and all(_alike(use, uses[0]) for use in uses)
-    }
-    known = states(entered)
-    return lambda at: literal.last_before(known, starts, at, nothing), inline
-
-
-def _calls(code: str, routine: str) -> list[int]:
-    """Where a routine of the file is called."""
-    call = re.compile(rf"(?<![\w$]){routine}\s*\(", re.IGNORECASE)
-    begun = {match.start("routine") for match in ROUTINE.finditer(code)}
-    return [match.start() for match in call.finditer(code) if match.start() not in begun]
-
-
-def _alike(one: Used, other: Used) -> bool:
-    """The same names, hence the same poses, which a file states once; poses without a name by their numbers."""
-    return all(a.name == b.name and _places_of(a) == _places_of(b) for a, b in zip(one, other, strict=True))
-
-
-def _places_of(place: literal.NamedPose) -> list[float]:
-    return [] if place.T is None else place.T.ravel().tolist()
+    return place
 
 
 def _key(name: str) -> str:

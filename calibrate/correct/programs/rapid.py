@@ -35,6 +35,7 @@ TOOL = re.compile(
     rf"\btooldata\s+(?P<name>\w+)\s*:=\s*\[\s*(?P<held>\w+)\s*,\s*\[\s*(?P<frame>{POSE})\s*\]", re.IGNORECASE
 )
 ASSIGNED = re.compile(r"\b(?P<name>\w++)(?:\.\w++)*+\s*+:=")
+PARAMETER = re.compile(r"\b(?:wobjdata|tooldata)\s+(?P<name>\w+)\s*[,)|]", re.IGNORECASE)
 USED = re.compile(r"\\WObj\s*:=\s*(?P<name>\w+)", re.IGNORECASE)
 SHIFTED = re.compile(r"\bPDisp(?:Set|On)\b", re.IGNORECASE)
 NAMED = re.compile(
@@ -130,6 +131,10 @@ def _places(code: str) -> literal.Places:
         elif not is_object and match["held"].upper() != "TRUE":
             why = f"tool {name} is stationary, which is not corrected"
         held[name.lower()] = literal.NamedPose(name, None if assigned else pose, why)
+    for match in PARAMETER.finditer(code):
+        held[match["name"].lower()] = literal.NamedPose(
+            match["name"], refused=f"{match['name']} is a parameter of its routine"
+        )
 
     def places(at: int) -> tuple[literal.NamedPose, literal.NamedPose]:
         end = code.find(";", at, at + literal.LONGEST_MOVE)

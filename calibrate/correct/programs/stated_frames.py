@@ -2,21 +2,30 @@
 
 What the file declares is used. What it only names, or leaves to the state of the controller, the user states for the
 whole file; a target whose frame or tool is known to neither is left as it is, with the remedy. A tool that is not named
-at all is that of the rig file.
+at all is that of the rig file. What a program sets holds until it sets another, along its calls, branches and loops.
 """
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from calibrate.correct.programs.literal import Literal, NamedPose, Targets, line_of
+from calibrate.correct.programs.literal import Literal, NamedPose, Places, Targets, last_before, line_of
 from calibrate.errors import DataError
 
 Floats = NDArray[np.float64]
 
 SAME = 2e-6  # m and of a rotation matrix: rounding of what is written
+CALL = re.compile(r"(?:\b(?P<started>DO|run)[ \t]+)?(?<![\w$.#])(?P<name>[A-Z_]\w*)[ \t]*\(", re.IGNORECASE)
+BLOCKS = ("if", "loop", "scope")
+CALLS = ("call", "started")
+BRANCH = "is set in a branch or a loop above, or not"
+CALLERS = "is not the same at all calls of its routine"
+DEEPEST = 50  # calls within calls that are followed
+LOOPS = 8  # blocks within blocks: deeper, what a loop sets is not followed
+Used = tuple[NamedPose, NamedPose]  # frame and tool
 
 
 @dataclass(frozen=True)
@@ -109,3 +118,155 @@ def _same(one: Floats, other: Floats) -> bool:
 
 def _listed(names: set[str]) -> str:
     return ", ".join(sorted(name or "not named" for name in names))
+
+
+@dataclass(frozen=True)
+class Event:
+    """A place where a program sets a frame or tool, or branches.
+
+    `kind`: routine, leave (its end), call, started (as a thread or an interrupt), set, if, loop, scope, else (the next
+    branch), otherwise (the last one), break, end (of the innermost block or routine), return.
+    """
+
+    at: int
+    kind: str
+    name: str = ""  # of a routine
+    poses: tuple[NamedPose | None, NamedPose | None] = (None, None)  # set, or of a routine that nothing here calls
+    words: frozenset[str] = frozenset()  # parameters of a routine; names in what is set
+
+
+def set_above(events: Sequence[Event], first: Used, words: tuple[str, str]) -> Places:
+    """Frame and tool at each place, as the program sets them on its way there; `words`: what the dialect calls them.
+
+    Where branches, loops or callers lead there with different ones, they are refused.
+    """
+    flow = _Flow(sorted(events, key=lambda event: event.at), first, words)
+    known, starts = flow.known(), [event.at for event in flow.events]
+    return lambda at: last_before(known, starts, at, first)
+
+
+def calls_of(code: str, begun: Sequence[re.Match[str]]) -> list[Event]:
+    """Of the routines that begin there, by their group `name` in small letters."""
+    names, own = {match["name"].lower() for match in begun}, {match.start("name") for match in begun}
+    return [
+        Event(match.start("name"), "started" if match["started"] else "call", match["name"].lower())
+        for match in CALL.finditer(code)
+        if match["name"].lower() in names and match.start("name") not in own
+    ]
+
+
+def words_of(text: str) -> frozenset[str]:
+    return frozenset(re.findall(r"[a-z_]\w*", text.lower()))
+
+
+class _Flow:
+    def __init__(self, events: list[Event], first: Used, words: tuple[str, str]) -> None:
+        self.events, self.first, self.words = events, first, words
+        self.is_set = [any(e.kind == "set" and e.poses[k] for e in events) for k in (0, 1)]
+        self.bodies: dict[int, list[int]] = {-1: []}  # by the event that begins a routine; -1: outside of all
+        self._split()
+        self.names = {events[i].name: i for i in reversed(self.bodies) if i >= 0}
+        self.seen: dict[int, Used] = {}  # behind each event, on all ways there
+        self.left: dict[tuple[int, ...], Used] = {}  # by routine and what it is entered with
+        self.running: list[int] = []
+        self.refused: dict[str, NamedPose] = {}
+
+    def _split(self) -> None:
+        opened: list[int | None] = [-1]  # None: a block
+        for i, event in enumerate(self.events):
+            if event.kind == "routine":
+                opened.append(i)
+                self.bodies[i] = []
+            elif event.kind in BLOCKS:
+                opened.append(None)
+            elif event.kind == "leave":
+                while len(opened) > 1 and opened.pop() is None:
+                    pass
+            elif event.kind == "end" and len(opened) > 1 and opened.pop() is not None:
+                self.events[i] = replace(event, kind="leave")
+            self.bodies[next(one for one in reversed(opened) if one is not None)].append(i)
+
+    def known(self) -> list[Used]:
+        called = {self.names[event.name] for event in self.events if event.kind in CALLS}
+        for routine in sorted(self.bodies, key=lambda one: one in called):
+            if all(key[0] != routine for key in self.left):
+                poses = self.events[routine].poses if routine >= 0 else self.first
+                self._run(routine, (poses[0] or self.first[0], poses[1] or self.first[1]))
+        return [self.seen[i] for i in range(len(self.events))]
+
+    def _run(self, routine: int, entry: Used) -> Used:
+        """What holds behind a routine that is entered with these."""
+        key = (routine, *map(id, entry))
+        if key in self.left:
+            return self.left[key]
+        if routine in self.running or len(self.running) > DEEPEST:
+            return self._unknown("is set in a routine that calls itself", entry)
+        self.running.append(routine)
+        opened, ends = list[tuple[str, int, Used, list[Used]]](), list[Used]()
+        state, k, body = entry, 0, self.bodies[routine]
+        while k < len(body):
+            i, event = body[k], self.events[body[k]]
+            if event.kind in BLOCKS:
+                if event.kind == "loop" and len(opened) > LOOPS:
+                    state = self._joined([state, self._unknown(BRANCH, state)])
+                opened.append((event.kind, k, state, [state]))
+            elif event.kind == "end" and opened:
+                kind, begin, entered, ways = opened.pop()
+                state = entered if kind == "scope" else self._joined([*ways, state])
+                if kind == "loop" and not all(map(_alike, state, entered)):
+                    k = begin  # once more, as it is entered from its end
+                    continue
+            elif event.kind in ("else", "otherwise") and opened:
+                ways = opened[-1][3]
+                ways[:] = [*(ways if event.kind == "else" else ways[1:]), state]
+                state = opened[-1][2]
+            elif event.kind == "break":
+                next((ways for kind, _, _, ways in reversed(opened) if kind == "loop"), ends).append(state)
+            elif event.kind == "return":
+                ends.append(state)
+            else:
+                state = self._behind(event, state, routine)
+            self.seen[i] = self._joined([self.seen.get(i, state), state], CALLERS)
+            k += 1
+        self.running.pop()
+        self.left[key] = self._joined([*ends, state])
+        return self.left[key]
+
+    def _behind(self, event: Event, state: Used, routine: int) -> Used:
+        poses: Sequence[NamedPose | None] = (None, None)
+        if event.kind == "set":
+            given = routine >= 0 and event.words & self.events[routine].words
+            why = f"is set from a parameter of the routine {self.events[routine].name}"
+            poses = [self._refuse(why, k) if pose and given else pose for k, pose in enumerate(event.poses)]
+        elif event.kind in CALLS:
+            why, started = f"is set in the called routine {event.name}", event.kind == "started"
+            any_moment = f"is that of any moment at which {event.name} may be started"
+            entry = self._unknown(any_moment, state) if started else state
+            poses = [
+                None if pose is entry[k] else self._refuse(why, k) if started or pose.refused else pose
+                for k, pose in enumerate(self._run(self.names[event.name], entry))
+            ]
+        return (poses[0] or state[0], poses[1] or state[1])
+
+    def _refuse(self, why: str, k: int) -> NamedPose:
+        why = f"the {self.words[k]} {why}"
+        return self.refused.setdefault(why, NamedPose(refused=why))
+
+    def _unknown(self, why: str, state: Used) -> Used:
+        frame, tool = (self._refuse(why, k) if self.is_set[k] else pose for k, pose in enumerate(state))
+        return frame, tool
+
+    def _joined(self, ways: Sequence[Used], why: str = BRANCH) -> Used:
+        frame, tool = (
+            way[0]
+            if all(_alike(way[0], other) for other in way)
+            else next((one for one in way if one.refused), self._refuse(why, k))
+            for k, way in enumerate(zip(*ways, strict=True))
+        )
+        return frame, tool
+
+
+def _alike(one: NamedPose, other: NamedPose) -> bool:
+    """The same numbers, or where one is not known the same name."""
+    same = one.name == other.name if one.T is None or other.T is None else np.array_equal(one.T, other.T)
+    return same and one.refused == other.refused

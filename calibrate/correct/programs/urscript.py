@@ -10,6 +10,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from calibrate.correct.programs import literal
+from calibrate.correct.programs.stated_frames import Event, calls_of, set_above, words_of
 from calibrate.correct.rotations import VECTOR
 
 LIST = rf"(?P<pose>p?)\[\s*{literal.NUMBER}(?:\s*,\s*{literal.NUMBER})*\s*\]"
@@ -23,7 +24,12 @@ INLINE_END = re.compile(ARC + LIST)
 POSE = re.compile(rf"(?<!\w)(?P<pose>p)\[\s*{literal.NUMBER}(?:\s*,\s*{literal.NUMBER}){{5}}\s*\]")
 ARRAY = re.compile(r"(?<!\w)(?P<name>[A-Za-z_]\w*)\s*=\s*\[\s*(?=p\[)")
 ASSIGNED = re.compile(rf"(?<!\w)(?P<name>[A-Za-z_]\w*)\s*=\s*{LIST}")
-TCP = re.compile(rf"\bset_tcp\s*\(\s*(?P<literal>{LIST}\s*\))?")
+ROUTINE = re.compile(r"^[ \t]*(?:def|thread|sec)\s+(?P<name>\w+)\s*\((?P<parameters>[^)]*)", re.MULTILINE)
+WAY = re.compile(
+    r"(?<![\w.])(?:(?P<loop>while)|(?P<if>if)|(?P<else>elif)|(?P<otherwise>else)|(?P<end>end)|(?P<return>return)"
+    r"|(?P<break>break|continue))\b"
+)
+TCP = re.compile(rf"\bset_tcp\s*\(\s*(?:(?P<literal>{LIST}\s*\))|(?P<words>[^\n]*))")
 
 
 def find(text: str, n_joints: int) -> literal.Targets:
@@ -50,15 +56,21 @@ def find(text: str, n_joints: int) -> literal.Targets:
 
 
 def _places(code: str) -> literal.Places:
-    """Poses are in the base, with the tool centre point that was set last above."""
-    base = literal.NamedPose("base", np.eye(4))
-    starts, tools = list[int](), list[literal.NamedPose]()
-    for match in TCP.finditer(code):
+    """Poses are in the base, with the tool centre point that is set on the way there."""
+    routines, tools = list(ROUTINE.finditer(code)), list(TCP.finditer(code))
+    events = [Event(match.start(), match.lastgroup or "") for match in WAY.finditer(code)]
+    events += calls_of(code, routines)
+    for k, match in enumerate(routines):
+        # The first one is the program; others that nothing here calls are called by what is not in the file.
+        tool = literal.NamedPose("the caller") if k and tools else None
+        parameters = words_of(match["parameters"])
+        events.append(Event(match.start("name"), "routine", match["name"].lower(), (None, tool), parameters))
+    for match in tools:
         numbers = [v for _, v in literal.numbers_in(code, *match.span("literal"))] if match["literal"] else []
         line = f"set_tcp of line {literal.line_of(code, match.start())}"
-        starts.append(match.start())
-        tools.append(literal.NamedPose(line, URSCRIPT.frame(numbers) if len(numbers) == 6 else None))
-    return lambda at: (base, literal.last_before(tools, starts, at, literal.NamedPose()))
+        tool = literal.NamedPose(line, URSCRIPT.frame(numbers) if len(numbers) == 6 else None)
+        events.append(Event(match.start(), "set", "", (None, tool), words_of(match["words"] or "")))
+    return set_above(events, (literal.NamedPose("base", np.eye(4)), literal.NamedPose()), ("frame", "tool"))
 
 
 def _elements(code: str, array: re.Match[str]) -> Iterator[tuple[int, re.Match[str]]]:

@@ -220,5 +220,5 @@ def test_a_routine_has_the_base_of_its_callers_where_they_agree(second, count):
     if count:
         assert corrected(text, ".src").frames[0][0, 3] == pytest.approx(0.1)
     else:
-        with pytest.raises(DataError, match="sets no frame"):
+        with pytest.raises(DataError, match="not the same at all calls"):
             corrected(text, ".src")
