@@ -49,10 +49,11 @@ WAY = re.compile(
     re.IGNORECASE | re.MULTILINE,
 )
 SET = re.compile(
-    r"\$(?P<what>BASE|TOOL)(?:\.\w+)?[ \t]*=(?!=)[ \t]*(?P<value>[^\n]*)"
+    r"\$(?P<what>BASE|TOOL)(?:\.\w+)?[ \t]*=(?!=)[ \t]*(?P<value>(?:\{[^{}\n]*\}|\([^()\n]*\)|[^\n,])*)"
     r"|\bBAS\s*\(\s*#(?P<kind>BASE|TOOL)\s*,\s*(?P<number>\w+)\s*\)|\bFDAT_ACT\s*=\s*(?P<inline>\w+)",
     re.IGNORECASE,
 )
+WITH = re.compile(r"^[ \t]*(?:S?(?:PTP|LIN|CIRC)|SPL)\b[^\n]*?\bWITH\b[^\n]*", re.IGNORECASE | re.MULTILINE)
 HELD = re.compile(rf"(?<!\w)(?P<name>\$?\w+(?:[ \t]*\[[ \t]*\d+[ \t]*\])?)\s*=\s*{AGGREGATE}(?!\s*:)", re.IGNORECASE)
 INLINE_DATA = re.compile(r"\bFDAT\s+(?P<name>\w+)\s*=\s*\{(?P<fields>[^{}]*)\}", re.IGNORECASE)
 CHANGED = re.compile(r"(?<![\w$.])(?P<name>\$?\w+(?:[ \t]*\[[ \t]*\d+[ \t]*\])?)(?:\.\w+)*[ \t]*=(?!=)", re.IGNORECASE)
@@ -79,7 +80,8 @@ def find(text: str, n_joints: int) -> literal.Targets:
         else:
             name = match["name"]
             moves = literal.moves_to(by_name, name)
-        own = None if inline else inline_data.get("F" + name.upper().removeprefix("X"))
+        alone = any(WITH.match(move.text) and SET.search(move.text) for move in moves)
+        own = None if inline or alone else inline_data.get("F" + name.upper().removeprefix("X"))
         one = _literal(text, match, name, moves, n_joints, own)
         if one is None:
             skipped.append(f"{name}: an aggregate that does not state the whole target is not corrected")
@@ -152,6 +154,14 @@ def _places(code: str) -> tuple[literal.Places, dict[str, Used]]:
         named = inline.get(form["name"].upper()) if form else None
         return place(what, value) if named is None else named[what == "TOOL"]
 
+    def poses(match: re.Match[str]) -> tuple[literal.NamedPose | None, literal.NamedPose | None]:
+        if match["inline"]:
+            unknown = replace(nothing, name=f"FDAT {match['inline']}")
+            return inline.get(match["inline"].upper(), (unknown, unknown))
+        what = (match["what"] or match["kind"]).upper()
+        pose = given(what, match["value"] or f"{what}_DATA[{match['number']}]")
+        return (pose, None) if what == "BASE" else (None, pose)
+
     routines = list(ROUTINE.finditer(code))
     events = [Event(match.start(), match.lastgroup or "") for match in WAY.finditer(code)]
     events += calls_of(code, routines)
@@ -160,16 +170,20 @@ def _places(code: str) -> tuple[literal.Places, dict[str, Used]]:
             Event(match.start(), "leave"),
             Event(match.start("name"), "routine", match["name"].lower(), words=words_of(match["parameters"])),
         ]
+    alone = {match.start(): match.end() for match in WITH.finditer(code)}
     for match in SET.finditer(code):
-        if match["inline"]:
-            unknown = replace(nothing, name=f"FDAT {match['inline']}")
-            poses = inline.get(match["inline"].upper(), (unknown, unknown))
-        else:
-            what = (match["what"] or match["kind"]).upper()
-            pose = given(what, match["value"] or f"{what}_DATA[{match['number']}]")
-            poses = (pose, None) if what == "BASE" else (None, pose)
-        events.append(Event(match.start(), "set", "", poses, words_of(match["value"] or match["number"] or "")))
-    return set_above(events, (nothing, nothing), ("base", "tool")), inline
+        if literal.line_start(code, match.start()) not in alone:
+            used = words_of(match["value"] or match["number"] or "")
+            events.append(Event(match.start(), "set", "", poses(match), used))
+    above = set_above(events, (nothing, nothing), ("base", "tool"))
+
+    def places(at: int) -> Used:
+        base, tool = above(at)
+        for match in SET.finditer(code, at, alone.get(at, at)):  # for this one move
+            base, tool = (new or old for new, old in zip(poses(match), (base, tool), strict=True))
+        return base, tool
+
+    return places, inline
 
 
 def _poses(code: str) -> Callable[[str, str], literal.NamedPose]:

@@ -145,3 +145,36 @@ def test_a_tool_that_is_set_in_the_main_loop_holds_behind_it_only_where_both_way
 def test_a_thread_may_set_the_tool_at_any_moment() -> None:
     text = f"def weld():\nthread hand():\n{tcp(2)}end\n{tcp(1)}run hand()\n{MOVEL}end\n"
     assert of_urscript(text) == ["the tool is set in the called routine hand"]
+
+
+POSE = "{X 1, Y 0, Z 0, A 0, B 0, C 0}"
+
+
+def test_a_base_of_one_move_is_that_of_this_move_only() -> None:
+    other, tool = "{X 2000, Y 0, Z 0, A 0, B 0, C 0}", "$TOOL = {X 0, Y 0, Z 7000, A 0, B 0, C 0}"
+    text = (
+        f"DECL E6POS XP1 = {POSE}\nDEF a()\n{base(1)}SLIN XP1 WITH $VEL.CP = 0.2, $BASE = {other}, {tool}\n{POINT}END\n"
+    )
+    first, second = krl.find(text, 6).literals
+    assert [float(pose.T[0, 3]) for pose in (first.used[0][0], second.used[0][0]) if pose.T is not None] == [2.0, 1.0]
+    assert [float(pose.T[2, 3]) for pose in first.used[1] if pose.T is not None] == [7.0]
+    assert second.used[1][0].name == ""
+    assert of_krl(text.replace(other, "jig")) == ["JIG", 1.0]
+    assert of_krl(text.replace(other, "jigs[k]")) == ["the pose of JIGS[K] is chosen while the program runs", 1.0]
+
+
+def test_the_form_of_a_move_with_the_frames_of_its_fdat() -> None:
+    text = (
+        "BASE_DATA[2] = {X 2000, Y 0, Z 0, A 0, B 0, C 0}\nTOOL_DATA[3] = {X 0, Y 0, Z 3000, A 0, B 0, C 0}\n"
+        f"DECL FDAT FP1 = {{TOOL_NO 3, BASE_NO 2}}\nDECL FDAT FP9 = {{TOOL_NO 0, BASE_NO 0}}\nDECL E6POS XP9 = {POSE}\n"
+        f"DEF a()\n{base(1)}SPTP XP9 WITH $VEL_AXIS[1]=SVEL_JOINT(9.0), $TOOL=STOOL2(FP1), $BASE=SBASE(FP1)\nEND\n"
+    )
+    (frame,), (tool,) = krl.find(text, 6).literals[0].used
+    assert frame.name == "BASE_DATA[2]"
+    assert tool.name == "TOOL_DATA[3]"
+
+
+def test_the_base_of_a_spline_block_ends_with_the_block() -> None:
+    header = base(2).replace("$BASE", "SPLINE WITH $BASE")
+    text = f"DEF a()\n{base(1)}{header}SLIN {POSE}\nENDSPLINE\n{POINT}END\n"
+    assert of_krl(text) == [2.0, 1.0]
