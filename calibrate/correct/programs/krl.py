@@ -21,12 +21,15 @@ from calibrate.correct.rotations import KUKA
 Floats = NDArray[np.float64]
 
 AGGREGATE = r"\{(?:\s*(?:E6POS|E6AXIS|POS|AXIS|FRAME)\s*:)?(?P<fields>[^{}\[\]]*)\}"
-FIELD = re.compile(rf"\b(?P<key>[A-Z]\w*)\s+(?P<number>{literal.NUMBER}|'B[01]+')", re.IGNORECASE)
+FIELD = re.compile(rf"\b(?P<key>[A-Z]\w*)\s+(?P<number>{literal.NUMBER}|'B[01]+')(?=\s*(?:[,}}]|$))", re.IGNORECASE)
 NAME = r"[A-Za-z_]\w*(?:\[[^\]]*\])?"
-INLINE = re.compile(rf"^[ \t]*S?(?:PTP|LIN|CIRC)\s+{AGGREGATE}", re.IGNORECASE | re.MULTILINE)
+GOES = r"^[ \t]*(?:S?(?:PTP|LIN|CIRC)|SPL)"
+# Geometric operators make another target of a point.
+COMPUTED = rf"(?:{NAME}|\{{[^{{}}]*\}})(?:[ \t]*:[ \t]*(?:{NAME}|\{{[^{{}}]*\}}))*"
+INLINE = re.compile(rf"{GOES}\s+{AGGREGATE}(?!\s*:)", re.IGNORECASE | re.MULTILINE)
 # An arc has two targets: the auxiliary point, and its end.
-ARC = r"^[ \t]*S?CIRC\s+(?:" + NAME + r"|\{[^{}]*\})\s*,\s*"
-INLINE_END = re.compile(ARC + AGGREGATE, re.IGNORECASE | re.MULTILINE)
+ARC = rf"^[ \t]*S?CIRC\s+{COMPUTED}\s*,\s*"
+INLINE_END = re.compile(rf"{ARC}{AGGREGATE}(?!\s*:)", re.IGNORECASE | re.MULTILINE)
 ARRAY = re.compile(r"\b(?:E6POS|E6AXIS|POS|AXIS)\s+(?P<name>\w+)\s*\[", re.IGNORECASE)
 ELEMENT = re.compile(
     rf"^[ \t]*(?P<name>(?P<array>\w+)\s*\[\s*\d+\s*\])\s*=\s*{AGGREGATE}", re.IGNORECASE | re.MULTILINE
@@ -35,9 +38,10 @@ DECLARED = re.compile(
     rf"^[ \t]*(?:DECL\s+)?(?:GLOBAL\s+)?(?:CONST\s+)?(?:E6POS|E6AXIS|POS|AXIS)\s+(?P<name>\w+)\s*=\s*{AGGREGATE}",
     re.IGNORECASE | re.MULTILINE,
 )
-MOVE = re.compile(rf"^[ \t]*S?(?:PTP|LIN|CIRC)\s+(?P<target>{NAME})", re.IGNORECASE | re.MULTILINE)
-ARC_END = re.compile(rf"{ARC}(?P<target>{NAME})", re.IGNORECASE | re.MULTILINE)
-OTHER = re.compile(r"^[ \t]*S?(?:PTP_REL|LIN_REL|CIRC_REL)\b", re.IGNORECASE | re.MULTILINE)
+TARGET = rf"(?P<target>\{{|{NAME}(?:[ \t]*:[ \t]*(?:{NAME}|\{{[^{{}}]*\}}))*)"
+MOVE = re.compile(rf"{GOES}\s+{TARGET}", re.IGNORECASE | re.MULTILINE)
+ARC_END = re.compile(rf"{ARC}{TARGET}", re.IGNORECASE | re.MULTILINE)
+OTHER = re.compile(rf"{GOES}_REL\b", re.IGNORECASE | re.MULTILINE)
 ROUTINE = re.compile(
     r"^[ \t]*(?:GLOBAL\s+)?DEF(?:FCT\s+\w+)?\s+(?P<name>\w+)\s*\((?P<parameters>[^)]*)",
     re.IGNORECASE | re.MULTILINE,
@@ -53,10 +57,10 @@ SET = re.compile(
     r"|\bBAS\s*\(\s*#(?P<kind>BASE|TOOL)\s*,\s*(?P<number>\w+)\s*\)|\bFDAT_ACT\s*=\s*(?P<inline>\w+)",
     re.IGNORECASE,
 )
-WITH = re.compile(r"^[ \t]*(?:S?(?:PTP|LIN|CIRC)|SPL)\b[^\n]*?\bWITH\b[^\n]*", re.IGNORECASE | re.MULTILINE)
+WITH = re.compile(rf"{GOES}\b[^\n]*?\bWITH\b[^\n]*", re.IGNORECASE | re.MULTILINE)
 HELD = re.compile(rf"(?<!\w)(?P<name>\$?\w+(?:[ \t]*\[[ \t]*\d+[ \t]*\])?)\s*=\s*{AGGREGATE}(?!\s*:)", re.IGNORECASE)
 INLINE_DATA = re.compile(r"\bFDAT\s+(?P<name>\w+)\s*=\s*\{(?P<fields>[^{}]*)\}", re.IGNORECASE)
-CHANGED = re.compile(r"(?<![\w$.])(?P<name>\$?\w+(?:[ \t]*\[[ \t]*\d+[ \t]*\])?)(?:\.\w+)*[ \t]*=(?!=)", re.IGNORECASE)
+CHANGED = re.compile(r"(?<![\w$.])(?P<name>\$?\w+(?:[ \t]*\[[^\]\n]*\])?)(?:\.\w+)*[ \t]*=(?!=)", re.IGNORECASE)
 CHOSEN = re.compile(r"\[(?!\d+\])")  # an index that is no number
 INLINE_FORM = re.compile(r"S(?:BASE|TOOL2?)\s*\(\s*(?P<name>\w+)\s*\)\s*", re.IGNORECASE)
 FIXED = re.compile(r"\$IPO_MODE\s*=\s*#TCP|IPO_FRAME\s+#TCP", re.IGNORECASE)
@@ -83,12 +87,13 @@ def find(text: str, n_joints: int) -> literal.Targets:
         alone = any(WITH.match(move.text) and SET.search(move.text) for move in moves)
         own = None if inline or alone else inline_data.get("F" + name.upper().removeprefix("X"))
         one = _literal(text, match, name, moves, n_joints, own)
-        if one is None:
-            skipped.append(f"{name}: an aggregate that does not state the whole target is not corrected")
-        else:
+        if one is None and not inline:
+            why = f"{name}: an aggregate that does not state the whole target is not corrected"
+            skipped.append(f"line {literal.line_of(text, match.start('fields'))}: {why}")
+        elif one is not None:
             literals.append(one)
     others = ((m.end(), f"{m.group().strip()}: relative moves are not corrected") for m in OTHER.finditer(code))
-    skipped += literal.sentences(text, by_name, literals, others)
+    skipped += literal.sentences(text, code, by_name, literals, CHANGED, others)
     return literal.Targets(tuple(sorted(literals, key=lambda one: one.at)), tuple(skipped))
 
 

@@ -15,15 +15,19 @@ from calibrate.correct.rotations import VECTOR
 
 LIST = rf"(?P<pose>p?)\[\s*{literal.NUMBER}(?:\s*,\s*{literal.NUMBER})*\s*\]"
 NAME = r"[A-Za-z_]\w*(?:\[[^\[\]]*\])?"
-MOVE = re.compile(rf"\b(?:movej|movel|movep|servoj|movec)\s*\(\s*(?:\w+\s*=\s*)?(?P<target>p?\[|{NAME})")
-INLINE = re.compile(rf"\b(?:movej|movel|movep|servoj|movec)\s*\(\s*(?:\w+\s*=\s*)?{LIST}")
+CALLED = r"(?:\((?:[^()\n]|\([^()\n]*\))*\))?"
+MOVE = re.compile(rf"\b(?:movej|movel|movep|servoj|servoc|movec)\s*\(\s*(?:\w+\s*=\s*)?(?P<target>p?\[|{NAME})")
+INLINE = re.compile(rf"\b(?:movej|movel|movep|servoj|servoc|movec)\s*\(\s*(?:\w+\s*=\s*)?{LIST}")
 # An arc has two targets: a point on it, and its end.
-ARC = rf"\bmovec\s*\(\s*(?:\w+\s*=\s*)?(?:{NAME}|p\[[^\[\]]*\])\s*,\s*(?:\w+\s*=\s*)?"
+ARC = rf"\bmovec\s*\(\s*(?:\w+\s*=\s*)?(?:{NAME}{CALLED}|p\[[^\[\]]*\])\s*,\s*(?:\w+\s*=\s*)?"
 ARC_END = re.compile(rf"{ARC}(?P<target>p?\[|{NAME})")
 INLINE_END = re.compile(ARC + LIST)
 POSE = re.compile(rf"(?<!\w)(?P<pose>p)\[\s*{literal.NUMBER}(?:\s*,\s*{literal.NUMBER}){{5}}\s*\]")
 ARRAY = re.compile(r"(?<!\w)(?P<name>[A-Za-z_]\w*)\s*=\s*\[\s*(?=p\[)")
 ASSIGNED = re.compile(rf"(?<!\w)(?P<name>[A-Za-z_]\w*)\s*=\s*{LIST}")
+CHANGED = re.compile(
+    r"^[ \t]*(?:(?:global|local)[ \t]+)?(?P<name>[A-Za-z_]\w*(?:\[[^\[\]\n]*\])?)[ \t]*=(?!=)[ \t]*", re.MULTILINE
+)
 ROUTINE = re.compile(r"^[ \t]*(?:def|thread|sec)\s+(?P<name>\w+)\s*\((?P<parameters>[^)]*)", re.MULTILINE)
 WAY = re.compile(
     r"(?<![\w.])(?:(?P<loop>while)|(?P<if>if)|(?P<else>elif)|(?P<otherwise>else)|(?P<end>end)|(?P<return>return)"
@@ -46,12 +50,11 @@ def find(text: str, n_joints: int) -> literal.Targets:
         if moves := literal.moves_to(by_name, name):
             literals.append(_literal(text, match, name, moves))
     good = [one for one in literals if len(one.numbers) == (n_joints if one.joints else 6)]
-    by_name = {target: moves for target, moves in by_name.items() if target not in ("[", "p[")}
     tools = [match.span() for match in TCP.finditer(code)]
     left = [
         one for one in literal.unread(text, code, POSE, good) if not any(begin <= one[0] < end for begin, end in tools)
     ]
-    skipped = literal.sentences(text, by_name, good, left)
+    skipped = literal.sentences(text, code, by_name, good, CHANGED, left)
     return literal.Targets(tuple(sorted(good, key=lambda one: one.at)), skipped)
 
 

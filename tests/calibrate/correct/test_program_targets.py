@@ -73,3 +73,47 @@ def test_fanuc_positions_that_are_chosen_at_run_time_or_absent_are_listed() -> N
     )
     assert [one.name for one in targets.literals] == ["P[1]"]
     assert lines(targets) == [2, 4]
+
+
+KRL = "{X 1, Y 0, Z 0, A 0, B 0, C 0}"
+UR = "p[1, 0, 0, 0, 0, 0]"
+ABB = "[[1,0,0],[1,0,0,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]]"
+REST = "v50, fine, tool0;\n"
+CASES = {  # text, targets that are corrected, lines that are listed
+    "KRL SPL": (".src", f"SPLINE\nSPL {KRL}\nSPL XP1\nENDSPLINE\nDECL E6POS XP1={KRL}\n", ["line 2", "XP1"], []),
+    "KRL SPL_REL": (".src", "SPLINE\nSPL_REL {Z 50}\nENDSPLINE\n", [], [2]),
+    "KRL literal with offset": (".src", f"LIN {KRL} : {{Z 50}}\n", [], [1]),
+    "KRL point with offset": (".src", f"DECL POS XP1={KRL}\nLIN XP1:{{Z 50}}\nLIN XP1\n", ["XP1"], [2]),
+    "KRL expressions": (".src", "LIN {X a[1], Y 0}\n" + f"LIN {KRL}\n".replace("X 1", "X 1+d"), [], [1, 2]),
+    "KRL computed point": (".src", f"DECL POS XP1={KRL}\nXP1.Z = 5\nXP1 = XP2\nLIN XP1\n", ["XP1"], [2, 3]),
+    "KRL arc": (".src", f"CIRC XP1:{{Z 5}}, {KRL}\n", ["line 1"], [1]),
+    "UR computed": (".script", f"movel(pose_add({UR}, {UR}))\nb = pose_trans({UR}, {UR})\nmovel(b)\n", [], [1, 2, 3]),
+    "UR changed": (".script", f"a = {UR}\na = pose_trans(a, {UR})\na[2] = 0.5\nmovel(a)\n", ["a"], [2, 3]),
+    "UR expressions": (".script", "movel(p[x, 0, 0, 0, 0, 0])\nmovej([d2r(10), 0, 0, 0, 0, 0])\n", [], [1, 2]),
+    "UR list": (".script", f"w = [{UR}, pose_add(w, {UR}),\n{UR}]\nmovel(w[2])\nmovel(w[0])\n", ["w[0]"], [1, 2, 3]),
+    "UR arc": (".script", f"movec(pose_trans(a, {UR}), {UR})\n", ["line 1"], [1]),
+    "RAPID Offs of a literal": (".mod", f"MoveL Offs({ABB},0,0,5), {REST}", [], [1]),
+    "RAPID RelTool": (
+        ".mod",
+        f"CONST robtarget p1 := {ABB};\nMoveL RelTool(p1,0,0,5), {REST}MoveL p1, {REST}",
+        ["p1"],
+        [2],
+    ),
+    "RAPID arc": (".mod", f"MoveC Offs(p1,0,0,5), {ABB}, {REST}", ["line 1"], [1]),
+    "RAPID parts": (".mod", f"MoveL [p1.trans, p1.rot, p1.robconf, p1.extax], {REST}", [], [1]),
+    "RAPID computed": (
+        ".mod",
+        f"VAR robtarget p1 := {ABB};\np1.trans.z := 5;\np1 := p2;\nMoveL p1, {REST}",
+        ["p1"],
+        [2, 3],
+    ),
+}
+
+
+@pytest.mark.parametrize(("suffix", "text", "corrected", "listed"), CASES.values(), ids=CASES)
+def test_targets_with_an_offset_or_computed_ones_are_listed(
+    suffix: str, text: str, corrected: list[str], listed: list[int]
+) -> None:
+    targets = found(text, suffix)
+    assert [one.name for one in targets.literals] == corrected
+    assert sorted(set(lines(targets))) == listed
