@@ -8,23 +8,13 @@ import re
 
 import numpy as np
 
-from calibrate.correct.programs.literal import (
-    NUMBER,
-    Dialect,
-    Literal,
-    Move,
-    NamedPose,
-    Span,
-    Targets,
-    instruction,
-    line_of,
-)
+from calibrate.correct.programs.literal import NUMBER, Dialect, Literal, Move, NamedPose, Targets, instruction, line_of
 from calibrate.correct.rotations import FANUC
 
 POSITION = re.compile(r"P\[\s*(?P<number>\d+)[^\]]*\]\s*\{(?P<body>[^}]*)\}")
 FIELD = re.compile(rf"\b(?P<key>X|Y|Z|W|P|R|J[1-9])\s*=\s*(?P<number>{NUMBER})\s*(?P<unit>mm|deg)")
 FRAMES = (("user frame", re.compile(r"UF\s*:\s*(?P<n>\w+)")), ("tool frame", re.compile(r"UT\s*:\s*(?P<n>\w+)")))
-GROUP = re.compile(r"\bGP(?P<n>\d+)\s*:")
+GROUP = re.compile(r"\bGP(?P<n>\d+)\s*:(?P<fields>(?:(?!\bGP\d)[^}])*)")
 # The end of an arc of C stands in a line of its own.
 MOVE = re.compile(r"^[ \t]*(?:\d*:\s*[JLCA]|:)\s+(?P<register>PR?)\[\s*(?P<number>\d*)", re.MULTILINE)
 MOVED = re.compile(r"\b(?:V?OFFSET|TOOL_OFFSET|INC|COORD|RTCP)\b", re.IGNORECASE)
@@ -65,10 +55,8 @@ def find(text: str, n_joints: int) -> Targets:
 
 def _literal(text: str, match: re.Match[str], moves: tuple[Move, ...], n_joints: int) -> Literal | str:
     """Of group 1; else why it is not corrected."""
-    groups = [(group["n"], group.end()) for group in GROUP.finditer(text, *match.span("body"))]
-    groups = groups or [("1", match.start("body"))]
-    ends = [*(begin for _, begin in groups[1:]), match.end("body")]
-    parts = {n: (begin, end) for (n, begin), end in zip(groups, ends, strict=True)}
+    groups = GROUP.finditer(text, *match.span("body"))
+    parts = {group["n"]: group.span("fields") for group in groups} or {"1": match.span("body")}
     whole = {n: numbers for n, part in parts.items() if (numbers := _numbers(text, part, n_joints))}
     if "1" not in whole:
         return "not a whole position of motion group 1 in mm and deg"
@@ -80,7 +68,7 @@ def _literal(text: str, match: re.Match[str], moves: tuple[Move, ...], n_joints:
     return Literal(f"P[{match['number']}]", parts["1"][0], spans, values, joints, moves, own=(frame, tool))
 
 
-def _numbers(text: str, part: Span, n_joints: int) -> tuple[bool, list[re.Match[str]]] | None:
+def _numbers(text: str, part: tuple[int, int], n_joints: int) -> tuple[bool, list[re.Match[str]]] | None:
     """Whether they are joint angles, and each; None: not a whole position."""
     found = {field["key"]: field for field in FIELD.finditer(text, *part)}
     if any((field["unit"] == "mm") != (key in "XYZ") for key, field in found.items()):

@@ -15,49 +15,45 @@ from numpy.typing import NDArray
 
 from calibrate.correct.corrected import Branch
 from calibrate.correct.programs import literal
-from calibrate.correct.programs.stated_frames import Event, Used, calls_of, set_above, words_of
+from calibrate.correct.programs.stated_frames import Event, Used, routines_of, set_above, words_of
 from calibrate.correct.rotations import KUKA
 
 Floats = NDArray[np.float64]
 
+LINES = re.IGNORECASE | re.MULTILINE
 AGGREGATE = r"\{(?:\s*(?:E6POS|E6AXIS|POS|AXIS|FRAME)\s*:)?(?P<fields>[^{}\[\]]*)\}"
 FIELD = re.compile(rf"\b(?P<key>[A-Z]\w*)\s+(?P<number>{literal.NUMBER}|'B[01]+')(?=\s*(?:[,}}]|$))", re.IGNORECASE)
 NAME = r"[A-Za-z_]\w*(?:\[[^\]]*\])?"
 GOES = r"^[ \t]*(?:S?(?:PTP|LIN|CIRC)|SPL)"
 # Geometric operators make another target of a point.
-COMPUTED = rf"(?:{NAME}|\{{[^{{}}]*\}})(?:[ \t]*:[ \t]*(?:{NAME}|\{{[^{{}}]*\}}))*"
-INLINE = re.compile(rf"{GOES}\s+{AGGREGATE}(?!\s*:)", re.IGNORECASE | re.MULTILINE)
+ONE = rf"(?:{NAME}|\{{[^{{}}]*\}})"
+TIMES = rf"(?:[ \t]*:[ \t]*{ONE})*"
+INLINE = re.compile(rf"{GOES}\s+{AGGREGATE}(?!\s*:)", LINES)
 # An arc has two targets: the auxiliary point, and its end.
-ARC = rf"^[ \t]*S?CIRC\s+{COMPUTED}\s*,\s*"
-INLINE_END = re.compile(rf"{ARC}{AGGREGATE}(?!\s*:)", re.IGNORECASE | re.MULTILINE)
+ARC = rf"^[ \t]*S?CIRC\s+{ONE}{TIMES}\s*,\s*"
+INLINE_END = re.compile(rf"{ARC}{AGGREGATE}(?!\s*:)", LINES)
 ARRAY = re.compile(r"\b(?:E6POS|E6AXIS|POS|AXIS)\s+(?P<name>\w+)\s*\[", re.IGNORECASE)
-ELEMENT = re.compile(
-    rf"^[ \t]*(?P<name>(?P<array>\w+)\s*\[\s*\d+\s*\])\s*=\s*{AGGREGATE}", re.IGNORECASE | re.MULTILINE
-)
+ELEMENT = re.compile(rf"^[ \t]*(?P<name>(?P<array>\w+)\s*\[\s*\d+\s*\])\s*=\s*{AGGREGATE}", LINES)
 DECLARED = re.compile(
-    rf"^[ \t]*(?:DECL\s+)?(?:GLOBAL\s+)?(?:CONST\s+)?(?:E6POS|E6AXIS|POS|AXIS)\s+(?P<name>\w+)\s*=\s*{AGGREGATE}",
-    re.IGNORECASE | re.MULTILINE,
+    rf"^[ \t]*(?:DECL\s+)?(?:GLOBAL\s+)?(?:CONST\s+)?(?:E6POS|E6AXIS|POS|AXIS)\s+(?P<name>\w+)\s*=\s*{AGGREGATE}", LINES
 )
-TARGET = rf"(?P<target>\{{|{NAME}(?:[ \t]*:[ \t]*(?:{NAME}|\{{[^{{}}]*\}}))*)"
-MOVE = re.compile(rf"{GOES}\s+{TARGET}", re.IGNORECASE | re.MULTILINE)
-ARC_END = re.compile(rf"{ARC}{TARGET}", re.IGNORECASE | re.MULTILINE)
-OTHER = re.compile(rf"{GOES}_REL\b", re.IGNORECASE | re.MULTILINE)
-ROUTINE = re.compile(
-    r"^[ \t]*(?:GLOBAL\s+)?DEF(?:FCT\s+\w+)?\s+(?P<name>\w+)\s*\((?P<parameters>[^)]*)",
-    re.IGNORECASE | re.MULTILINE,
-)
+TARGET = rf"(?P<target>\{{|{NAME}{TIMES})"
+MOVE = re.compile(rf"{GOES}\s+{TARGET}", LINES)
+ARC_END = re.compile(rf"{ARC}{TARGET}", LINES)
+OTHER = re.compile(rf"{GOES}_REL\b", LINES)
+ROUTINE = re.compile(r"^[ \t]*(?:GLOBAL\s+)?DEF(?:FCT\s+\w+)?\s+(?P<name>\w+)\s*\((?P<parameters>[^)]*)", LINES)
 WAY = re.compile(
     r"^[ \t]*(?:(?P<loop>FOR|WHILE|REPEAT|LOOP)|(?P<if>IF|SWITCH)|(?P<scope>(?:PTP_)?SPLINE)|(?P<else>CASE)"
-    r"|(?P<otherwise>ELSE|DEFAULT)|(?P<end>END(?:FOR|WHILE|LOOP|IF|SWITCH|SPLINE)|UNTIL)|(?P<leave>END(?:FCT)?)"
+    r"|(?P<otherwise>ELSE|DEFAULT)|(?P<end>END(?:FOR|WHILE|LOOP|IF|SWITCH|SPLINE|FCT)?|UNTIL)"
     r"|(?P<return>RETURN)|(?P<break>EXIT))\b",
-    re.IGNORECASE | re.MULTILINE,
+    LINES,
 )
 SET = re.compile(
     r"\$(?P<what>BASE|TOOL)(?:\.\w+)?[ \t]*=(?!=)[ \t]*(?P<value>(?:\{[^{}\n]*\}|\([^()\n]*\)|[^\n,])*)"
     r"|\bBAS\s*\(\s*#(?P<kind>BASE|TOOL)\s*,\s*(?P<number>\w+)\s*\)|\bFDAT_ACT\s*=\s*(?P<inline>\w+)",
     re.IGNORECASE,
 )
-WITH = re.compile(rf"{GOES}\b[^\n]*?\bWITH\b[^\n]*", re.IGNORECASE | re.MULTILINE)
+WITH = re.compile(rf"{GOES}\b[^\n]*?\bWITH\b[^\n]*", LINES)
 HELD = re.compile(rf"(?<!\w)(?P<name>\$?\w+(?:[ \t]*\[[ \t]*\d+[ \t]*\])?)\s*=\s*{AGGREGATE}(?!\s*:)", re.IGNORECASE)
 INLINE_DATA = re.compile(r"\bFDAT\s+(?P<name>\w+)\s*=\s*\{(?P<fields>[^{}]*)\}", re.IGNORECASE)
 CHANGED = re.compile(r"(?<![\w$.])(?P<name>\$?\w+(?:[ \t]*\[[^\]\n]*\])?)(?:\.\w+)*[ \t]*=(?!=)", re.IGNORECASE)
@@ -93,17 +89,12 @@ def find(text: str, n_joints: int) -> literal.Targets:
         elif one is not None:
             literals.append(one)
     others = ((m.end(), f"{m.group().strip()}: relative moves are not corrected") for m in OTHER.finditer(code))
-    skipped += literal.sentences(text, code, by_name, literals, CHANGED, others)
+    skipped += literal.sentences(code, by_name, literals, CHANGED, others)
     return literal.Targets(tuple(sorted(literals, key=lambda one: one.at)), tuple(skipped))
 
 
 def _literal(
-    text: str,
-    match: re.Match[str],
-    name: str,
-    moves: tuple[literal.Move, ...],
-    n_joints: int,
-    own: tuple[literal.NamedPose, literal.NamedPose] | None,
+    text: str, match: re.Match[str], name: str, moves: tuple[literal.Move, ...], n_joints: int, own: Used | None
 ) -> literal.Literal | None:
     begin = match.start("fields")
     fields = _fields(text, *match.span("fields"))
@@ -154,36 +145,28 @@ def _places(code: str) -> tuple[literal.Places, dict[str, Used]]:
         base, tool = (place(what, f"{what}_DATA[{numbers.get(what + '_NO')}]") for what in ("BASE", "TOOL"))
         inline[match["name"].upper()] = (base, tool)
 
-    def given(what: str, value: str) -> literal.NamedPose:
-        form = INLINE_FORM.fullmatch(value)
-        named = inline.get(form["name"].upper()) if form else None
-        return place(what, value) if named is None else named[what == "TOOL"]
-
     def poses(match: re.Match[str]) -> tuple[literal.NamedPose | None, literal.NamedPose | None]:
-        if match["inline"]:
-            unknown = replace(nothing, name=f"FDAT {match['inline']}")
-            return inline.get(match["inline"].upper(), (unknown, unknown))
-        what = (match["what"] or match["kind"]).upper()
-        pose = given(what, match["value"] or f"{what}_DATA[{match['number']}]")
-        return (pose, None) if what == "BASE" else (None, pose)
+        value = match["value"] or ""
+        form = INLINE_FORM.fullmatch(value)
+        fdat = match["inline"] or (form and form["name"])
+        unknown = replace(nothing, name=f"FDAT {fdat}")
+        base, tool = inline.get(fdat.upper(), (unknown, unknown)) if fdat else (None, None)
+        what = (match["what"] or match["kind"] or "").upper()
+        pose = place(what, value or f"{what}_DATA[{match['number']}]")
+        return (None if what == "TOOL" else base or pose), (None if what == "BASE" else tool or pose)
 
-    routines = list(ROUTINE.finditer(code))
-    events = [Event(match.start(), match.lastgroup or "") for match in WAY.finditer(code)]
-    events += calls_of(code, routines)
-    for match in routines:
-        events += [
-            Event(match.start(), "leave"),
-            Event(match.start("name"), "routine", match["name"].lower(), words=words_of(match["parameters"])),
-        ]
     alone = {match.start(): match.end() for match in WITH.finditer(code)}
+    ways = routines_of(code, ROUTINE, WAY)
+    sets: tuple[list[Event], list[Event]] = ([], [])
     for match in SET.finditer(code):
         if literal.line_start(code, match.start()) not in alone:
-            used = words_of(match["value"] or match["number"] or "")
-            events.append(Event(match.start(), "set", "", poses(match), used))
-    above = set_above(events, (nothing, nothing), ("base", "tool"))
+            words = words_of(re.sub(r"\{.*", "", match["value"] or match["number"] or ""))
+            for events, pose in zip(sets, poses(match), strict=True):
+                events += [Event(match.start(), "set", "", pose, words)] if pose else []
+    base_at, tool_at = (set_above([*ways, *sets[k]], nothing, word) for k, word in enumerate(("base", "tool")))
 
     def places(at: int) -> Used:
-        base, tool = above(at)
+        base, tool = base_at(at), tool_at(at)
         for match in SET.finditer(code, at, alone.get(at, at)):  # for this one move
             base, tool = (new or old for new, old in zip(poses(match), (base, tool), strict=True))
         return base, tool
@@ -193,11 +176,8 @@ def _places(code: str) -> tuple[literal.Places, dict[str, Used]]:
 
 def _poses(code: str) -> Callable[[str, str], literal.NamedPose]:
     """Of what a base or tool is set to: a frame of the file with one value, or a literal; each is read once."""
-    held, times = dict[str, Floats](), Counter(_key(match["name"]) for match in CHANGED.finditer(code))
-    for match in HELD.finditer(code):
-        fields = _fields(code, *match.span("fields"))
-        if all(key in fields for key in POSE):
-            held[_key(match["name"])] = KRL.frame([fields[key][1] for key in POSE])
+    held = {_key(match["name"]): _frame(code, *match.span("fields")) for match in HELD.finditer(code)}
+    times = Counter(_key(match["name"]) for match in CHANGED.finditer(code))
     fixed = "the tool is stationary (#TCP), which is not corrected" if FIXED.search(code) else ""
 
     @cache
@@ -205,14 +185,18 @@ def _poses(code: str) -> Callable[[str, str], literal.NamedPose]:
         name = _key(value)
         if name in ("$NULLFRAME", "$WORLD", f"{what}_DATA[0]"):
             return literal.NamedPose(name, np.eye(4), fixed)
-        if literal_pose := re.fullmatch(AGGREGATE, value.strip(), re.IGNORECASE):
-            fields = _fields(value, *literal_pose.span("fields"))
-            if all(key in fields for key in POSE):
-                return literal.NamedPose(f"${what}", KRL.frame([fields[key][1] for key in POSE]), fixed)
+        written = re.fullmatch(AGGREGATE, value.rstrip(), re.IGNORECASE)
+        if written and (T := _frame(value, *written.span("fields"))) is not None:
+            return literal.NamedPose(f"${what}", T, fixed)
         chosen = f"the pose of {name} is chosen while the program runs" if CHOSEN.search(name) else ""
         return literal.NamedPose(name, held.get(name) if times[name] == 1 else None, fixed or chosen)
 
     return place
+
+
+def _frame(text: str, begin: int, end: int) -> Floats | None:
+    fields = _fields(text, begin, end)
+    return KRL.frame([fields[key][1] for key in POSE]) if all(key in fields for key in POSE) else None
 
 
 def _key(name: str) -> str:

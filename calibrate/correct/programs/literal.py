@@ -202,12 +202,7 @@ def moves_to(by_name: Moves, name: str) -> tuple[Move, ...]:
 
 
 def sentences(
-    text: str,
-    code: str,
-    by_name: Moves,
-    literals: Sequence[Literal],
-    changed: re.Pattern[str],
-    others: Iterable[tuple[int, str]],
+    code: str, by_name: Moves, literals: Sequence[Literal], changed: re.Pattern[str], others: Iterable[tuple[int, str]]
 ) -> tuple[str, ...]:
     """On moves to what is none of the literals, on assignments that `changed` one, and on `others`: where, and why."""
     known = {key(one.name) for one in literals}
@@ -233,6 +228,6 @@ def sentences(
         if name in used | arrays and not written_out(match.end()):
             line = code[match.start("name") :].split("\n", 1)[0]
             elsewhere.append((match.start("name"), f"{shown(line)}: changes a target while the program runs"))
-    listed = {line_of(text, at) for at, _ in elsewhere}
-    more = [(at, why) for at, why in others if line_of(text, at) not in listed]  # an instruction is listed once
-    return tuple(dict.fromkeys(f"line {line_of(text, at)}: {why}" for at, why in (*elsewhere, *more)))
+    listed = {line_of(code, at) for at, _ in elsewhere}
+    more = [(at, why) for at, why in others if line_of(code, at) not in listed]  # an instruction is listed once
+    return tuple(dict.fromkeys(f"line {line_of(code, at)}: {why}" for at, why in (*elsewhere, *more)))

@@ -71,11 +71,10 @@ def find(text: str, n_joints: int) -> literal.Targets:
         elif inline:
             moves = (literal.instruction(text, first + inline.start(), places, ";"),)
             literals.append(_literal(text, match, f"line {literal.line_of(text, match.start())}", moves))
-    skipped = literal.sentences(text, code, by_name, literals, ASSIGNED, literal.unread(text, code, TARGET, literals))
+    skipped = literal.sentences(code, by_name, literals, ASSIGNED, literal.unread(text, code, TARGET, literals))
     if SHIFTED.search(code):
-        return literal.Targets(
-            (), ("the program displaces its targets (PDispSet, PDispOn), which is not corrected", *skipped)
-        )
+        why = "the program displaces its targets (PDispSet, PDispOn), which is not corrected"
+        return literal.Targets((), (why, *skipped))
     if n_joints != 6:
         return literal.Targets((), (*skipped, f"RAPID targets have six axes, this arm has {n_joints}"))
     return literal.Targets(tuple(literals), skipped)
@@ -132,9 +131,7 @@ def _places(code: str) -> literal.Places:
             why = f"tool {name} is stationary, which is not corrected"
         held[name.lower()] = literal.NamedPose(name, None if assigned else pose, why)
     for match in PARAMETER.finditer(code):
-        held[match["name"].lower()] = literal.NamedPose(
-            match["name"], refused=f"{match['name']} is a parameter of its routine"
-        )
+        held[match["name"].lower()] = literal.NamedPose(refused=f"{match['name']} is a parameter of its routine")
 
     def places(at: int) -> tuple[literal.NamedPose, literal.NamedPose]:
         end = code.find(";", at, at + literal.LONGEST_MOVE)

@@ -182,16 +182,12 @@ def _check(targets: Targets, dialect: Dialect, options: Options, text: str, name
 
 def _check_overshoots(moves: Sequence[Move], text: str, name: str) -> None:
     """A move before an arc, within a spline, or to another target than the next one would lead along another path."""
-    marks = [(mark.start(), (mark["end"] or "").upper() != "END") for mark in SPLINE.finditer(text)]
-    inside, starts = [within for _, within in marks], [at for at, _ in marks]
-    targets = Counter(move.line_start for move in moves)
+    marks = {mark.start(): (mark["end"] or "").upper() != "END" for mark in SPLINE.finditer(text)}
+    inside, starts, targets = list(marks.values()), list(marks), Counter(move.line_start for move in moves)
     for move in moves:
-        why = "to one of several targets" if targets[move.line_start] > 1 else ""
-        if last_before(inside, starts, move.line_start, False):
-            why = "within a spline"
-        elif ARC.search(re.split("[;#!]", move.text)[0]):
-            why = "along an arc"
-        if why:
+        spline, arc = last_before(inside, starts, move.line_start, False), ARC.search(re.split("[;#!]", move.text)[0])
+        if spline or arc or targets[move.line_start] > 1:
+            why = "within a spline" if spline else "along an arc" if arc else "to one of several targets"
             line = f"{name}: line {line_of(text, move.line_start)}"
             raise DataError(f"{line}: no overshoot point can stand before a move {why}; leave --approach out")
 

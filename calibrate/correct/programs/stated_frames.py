@@ -6,13 +6,13 @@ at all is that of the rig file. What a program sets holds until it sets another,
 """
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from calibrate.correct.programs.literal import Literal, NamedPose, Places, Targets, last_before, line_of
+from calibrate.correct.programs.literal import Literal, NamedPose, Targets, last_before, line_of
 from calibrate.errors import DataError
 
 Floats = NDArray[np.float64]
@@ -100,9 +100,8 @@ def _unusable(kind: _Kind, used: Sequence[NamedPose], given: Floats | None) -> s
         if kind is TOOL and place.T is not None and given is not None and not _same(place.T, given):
             return f"the tool {place.name}, as the file declares it, is not the one of --tool"
     if any(not _same(_pose(place, given, np.eye(4)), _pose(used[0], given, np.eye(4))) for place in used):
-        return (
-            f"it is used in several {kind.name}s ({_listed({place.name for place in used})}); give each its own target"
-        )
+        names = _listed({place.name for place in used})
+        return f"it is used in several {kind.name}s ({names}); give each its own target"
     return ""
 
 
@@ -122,37 +121,43 @@ def _listed(names: set[str]) -> str:
 
 @dataclass(frozen=True)
 class Event:
-    """A place where a program sets a frame or tool, or branches.
+    """A place where a program sets a frame (or a tool, which is followed by itself), or branches.
 
-    `kind`: routine, leave (its end), call, started (as a thread or an interrupt), set, if, loop, scope, else (the next
-    branch), otherwise (the last one), break, end (of the innermost block or routine), return.
+    `kind`: routine, call, started (as a thread or an interrupt), set, if, loop, scope, else (the next branch),
+    otherwise (the last one), break, return, end (of the innermost block or routine; of a routine it becomes "left").
     """
 
     at: int
     kind: str
     name: str = ""  # of a routine
-    poses: tuple[NamedPose | None, NamedPose | None] = (None, None)  # set, or of a routine that nothing here calls
+    pose: NamedPose | None = None  # what is set; of a routine: with what it is entered where nothing here calls it
     words: frozenset[str] = frozenset()  # parameters of a routine; names in what is set
 
 
-def set_above(events: Sequence[Event], first: Used, words: tuple[str, str]) -> Places:
-    """Frame and tool at each place, as the program sets them on its way there; `words`: what the dialect calls them.
+def set_above(events: Sequence[Event], first: NamedPose, word: str) -> Callable[[int], NamedPose]:
+    """The frame at each place, as the program sets it on its way there; `word`: what the dialect calls it.
 
-    Where branches, loops or callers lead there with different ones, they are refused.
+    Where branches, loops or callers lead there with different ones, it is refused.
     """
-    flow = _Flow(sorted(events, key=lambda event: event.at), first, words)
+    flow = _Flow(sorted(events, key=lambda event: event.at), first, word)
     known, starts = flow.known(), [event.at for event in flow.events]
     return lambda at: last_before(known, starts, at, first)
 
 
-def calls_of(code: str, begun: Sequence[re.Match[str]]) -> list[Event]:
-    """Of the routines that begin there, by their group `name` in small letters."""
-    names, own = {match["name"].lower() for match in begun}, {match.start("name") for match in begun}
-    return [
-        Event(match.start("name"), "started" if match["started"] else "call", match["name"].lower())
-        for match in CALL.finditer(code)
-        if match["name"].lower() in names and match.start("name") not in own
-    ]
+def routines_of(
+    code: str, begins: re.Pattern[str], branches: re.Pattern[str], caller: NamedPose | None = None
+) -> list[Event]:
+    """Where routines begin, branch and are called; `caller`: with what all but the first are entered from outside."""
+    begun = list(begins.finditer(code))
+    events = [Event(match.start(), match.lastgroup or "") for match in branches.finditer(code)]
+    for k, match in enumerate(begun):
+        words = words_of(match["parameters"])
+        events.append(Event(match.start("name"), "routine", match["name"].lower(), caller if k else None, words))
+    names, own = {event.name for event in events}, {event.at for event in events}
+    for match in CALL.finditer(code):
+        if (name := match["name"].lower()) in names and match.start("name") not in own:
+            events.append(Event(match.start("name"), "started" if match["started"] else "call", name))
+    return events
 
 
 def words_of(text: str) -> frozenset[str]:
@@ -160,14 +165,14 @@ def words_of(text: str) -> frozenset[str]:
 
 
 class _Flow:
-    def __init__(self, events: list[Event], first: Used, words: tuple[str, str]) -> None:
-        self.events, self.first, self.words = events, first, words
-        self.is_set = [any(e.kind == "set" and e.poses[k] for e in events) for k in (0, 1)]
+    def __init__(self, events: list[Event], first: NamedPose, word: str) -> None:
+        self.events, self.first, self.word = events, first, word
+        self.is_set = any(event.kind == "set" for event in events)
         self.bodies: dict[int, list[int]] = {-1: []}  # by the event that begins a routine; -1: outside of all
         self._split()
         self.names = {events[i].name: i for i in reversed(self.bodies) if i >= 0}
-        self.seen: dict[int, Used] = {}  # behind each event, on all ways there
-        self.left: dict[tuple[int, ...], Used] = {}  # by routine and what it is entered with
+        self.seen: dict[int, NamedPose] = {}  # behind each event, on all ways there
+        self.left: dict[tuple[int, int], NamedPose] = {}  # by routine and what it is entered with
         self.running: list[int] = []
         self.refused: dict[str, NamedPose] = {}
 
@@ -179,30 +184,26 @@ class _Flow:
                 self.bodies[i] = []
             elif event.kind in BLOCKS:
                 opened.append(None)
-            elif event.kind == "leave":
-                while len(opened) > 1 and opened.pop() is None:
-                    pass
             elif event.kind == "end" and len(opened) > 1 and opened.pop() is not None:
-                self.events[i] = replace(event, kind="leave")
+                self.events[i] = replace(event, kind="left")
             self.bodies[next(one for one in reversed(opened) if one is not None)].append(i)
 
-    def known(self) -> list[Used]:
+    def known(self) -> list[NamedPose]:
         called = {self.names[event.name] for event in self.events if event.kind in CALLS}
         for routine in sorted(self.bodies, key=lambda one: one in called):
             if all(key[0] != routine for key in self.left):
-                poses = self.events[routine].poses if routine >= 0 else self.first
-                self._run(routine, (poses[0] or self.first[0], poses[1] or self.first[1]))
+                self._run(routine, (self.events[routine].pose if routine >= 0 else None) or self.first)
         return [self.seen[i] for i in range(len(self.events))]
 
-    def _run(self, routine: int, entry: Used) -> Used:
-        """What holds behind a routine that is entered with these."""
-        key = (routine, *map(id, entry))
+    def _run(self, routine: int, entry: NamedPose) -> NamedPose:
+        """What holds behind a routine that is entered with this."""
+        key = (routine, id(entry))
         if key in self.left:
             return self.left[key]
         if routine in self.running or len(self.running) > DEEPEST:
             return self._unknown("is set in a routine that calls itself", entry)
         self.running.append(routine)
-        opened, ends = list[tuple[str, int, Used, list[Used]]](), list[Used]()
+        opened, ends = list[tuple[str, int, NamedPose, list[NamedPose]]](), list[NamedPose]()
         state, k, body = entry, 0, self.bodies[routine]
         while k < len(body):
             i, event = body[k], self.events[body[k]]
@@ -213,7 +214,7 @@ class _Flow:
             elif event.kind == "end" and opened:
                 kind, begin, entered, ways = opened.pop()
                 state = entered if kind == "scope" else self._joined([*ways, state])
-                if kind == "loop" and not all(map(_alike, state, entered)):
+                if kind == "loop" and not _alike(state, entered):
                     k = begin  # once more, as it is entered from its end
                     continue
             elif event.kind in ("else", "otherwise") and opened:
@@ -232,38 +233,30 @@ class _Flow:
         self.left[key] = self._joined([*ends, state])
         return self.left[key]
 
-    def _behind(self, event: Event, state: Used, routine: int) -> Used:
-        poses: Sequence[NamedPose | None] = (None, None)
-        if event.kind == "set":
+    def _behind(self, event: Event, state: NamedPose, routine: int) -> NamedPose:
+        if event.kind == "set" and event.pose:
             given = routine >= 0 and event.words & self.events[routine].words
             why = f"is set from a parameter of the routine {self.events[routine].name}"
-            poses = [self._refuse(why, k) if pose and given else pose for k, pose in enumerate(event.poses)]
-        elif event.kind in CALLS:
-            why, started = f"is set in the called routine {event.name}", event.kind == "started"
-            any_moment = f"is that of any moment at which {event.name} may be started"
-            entry = self._unknown(any_moment, state) if started else state
-            poses = [
-                None if pose is entry[k] else self._refuse(why, k) if started or pose.refused else pose
-                for k, pose in enumerate(self._run(self.names[event.name], entry))
-            ]
-        return (poses[0] or state[0], poses[1] or state[1])
+            return self._refuse(why) if given else event.pose
+        if event.kind not in CALLS:
+            return state
+        any_moment, started = f"is that of any moment at which {event.name} may be started", event.kind == "started"
+        entry = self._unknown(any_moment, state) if started else state
+        left = self._run(self.names[event.name], entry)
+        if left is entry:
+            return state
+        return self._refuse(f"is set in the called routine {event.name}") if started or left.refused else left
 
-    def _refuse(self, why: str, k: int) -> NamedPose:
-        why = f"the {self.words[k]} {why}"
-        return self.refused.setdefault(why, NamedPose(refused=why))
+    def _refuse(self, why: str) -> NamedPose:
+        return self.refused.setdefault(why, NamedPose(refused=f"the {self.word} {why}"))
 
-    def _unknown(self, why: str, state: Used) -> Used:
-        frame, tool = (self._refuse(why, k) if self.is_set[k] else pose for k, pose in enumerate(state))
-        return frame, tool
+    def _unknown(self, why: str, state: NamedPose) -> NamedPose:
+        return self._refuse(why) if self.is_set else state
 
-    def _joined(self, ways: Sequence[Used], why: str = BRANCH) -> Used:
-        frame, tool = (
-            way[0]
-            if all(_alike(way[0], other) for other in way)
-            else next((one for one in way if one.refused), self._refuse(why, k))
-            for k, way in enumerate(zip(*ways, strict=True))
-        )
-        return frame, tool
+    def _joined(self, ways: Sequence[NamedPose], why: str = BRANCH) -> NamedPose:
+        if all(_alike(ways[0], other) for other in ways):
+            return ways[0]
+        return next((one for one in ways if one.refused), self._refuse(why))
 
 
 def _alike(one: NamedPose, other: NamedPose) -> bool:

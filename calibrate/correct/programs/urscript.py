@@ -10,14 +10,15 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from calibrate.correct.programs import literal
-from calibrate.correct.programs.stated_frames import Event, calls_of, set_above, words_of
+from calibrate.correct.programs.stated_frames import Event, routines_of, set_above, words_of
 from calibrate.correct.rotations import VECTOR
 
 LIST = rf"(?P<pose>p?)\[\s*{literal.NUMBER}(?:\s*,\s*{literal.NUMBER})*\s*\]"
 NAME = r"[A-Za-z_]\w*(?:\[[^\[\]]*\])?"
 CALLED = r"(?:\((?:[^()\n]|\([^()\n]*\))*\))?"
-MOVE = re.compile(rf"\b(?:movej|movel|movep|servoj|servoc|movec)\s*\(\s*(?:\w+\s*=\s*)?(?P<target>p?\[|{NAME})")
-INLINE = re.compile(rf"\b(?:movej|movel|movep|servoj|servoc|movec)\s*\(\s*(?:\w+\s*=\s*)?{LIST}")
+GOES = r"\b(?:movej|movel|movep|servoj|servoc|movec)\s*\(\s*(?:\w+\s*=\s*)?"
+MOVE = re.compile(rf"{GOES}(?P<target>p?\[|{NAME})")
+INLINE = re.compile(rf"{GOES}{LIST}")
 # An arc has two targets: a point on it, and its end.
 ARC = rf"\bmovec\s*\(\s*(?:\w+\s*=\s*)?(?:{NAME}{CALLED}|p\[[^\[\]]*\])\s*,\s*(?:\w+\s*=\s*)?"
 ARC_END = re.compile(rf"{ARC}(?P<target>p?\[|{NAME})")
@@ -51,29 +52,24 @@ def find(text: str, n_joints: int) -> literal.Targets:
             literals.append(_literal(text, match, name, moves))
     good = [one for one in literals if len(one.numbers) == (n_joints if one.joints else 6)]
     tools = [match.span() for match in TCP.finditer(code)]
-    left = [
-        one for one in literal.unread(text, code, POSE, good) if not any(begin <= one[0] < end for begin, end in tools)
-    ]
-    skipped = literal.sentences(text, code, by_name, good, CHANGED, left)
+    unread = literal.unread(text, code, POSE, good)
+    left = (one for one in unread if not any(begin <= one[0] < end for begin, end in tools))
+    skipped = literal.sentences(code, by_name, good, CHANGED, left)
     return literal.Targets(tuple(sorted(good, key=lambda one: one.at)), skipped)
 
 
 def _places(code: str) -> literal.Places:
     """Poses are in the base, with the tool centre point that is set on the way there."""
-    routines, tools = list(ROUTINE.finditer(code)), list(TCP.finditer(code))
-    events = [Event(match.start(), match.lastgroup or "") for match in WAY.finditer(code)]
-    events += calls_of(code, routines)
-    for k, match in enumerate(routines):
-        # The first one is the program; others that nothing here calls are called by what is not in the file.
-        tool = literal.NamedPose("the caller") if k and tools else None
-        parameters = words_of(match["parameters"])
-        events.append(Event(match.start("name"), "routine", match["name"].lower(), (None, tool), parameters))
+    base, tools = literal.NamedPose("base", np.eye(4)), list(TCP.finditer(code))
+    # The first function is the program; others that nothing here calls are called by what is not in the file.
+    events = routines_of(code, ROUTINE, WAY, literal.NamedPose("the caller") if tools else None)
     for match in tools:
         numbers = [v for _, v in literal.numbers_in(code, *match.span("literal"))] if match["literal"] else []
         line = f"set_tcp of line {literal.line_of(code, match.start())}"
         tool = literal.NamedPose(line, URSCRIPT.frame(numbers) if len(numbers) == 6 else None)
-        events.append(Event(match.start(), "set", "", (None, tool), words_of(match["words"] or "")))
-    return set_above(events, (literal.NamedPose("base", np.eye(4)), literal.NamedPose()), ("frame", "tool"))
+        events.append(Event(match.start(), "set", "", tool, words_of(match["words"] or "")))
+    above = set_above(events, literal.NamedPose(), "tool")
+    return lambda at: (base, above(at))
 
 
 def _elements(code: str, array: re.Match[str]) -> Iterator[tuple[int, re.Match[str]]]:
