@@ -43,6 +43,7 @@ LINE = re.compile(r"line (\d+)\b")
 ALONG = re.compile(
     r"\b(?:(?:Move|Arc|Cap|Cut|Disp|Paint|Trigg)[LC]|S?LIN\b|S?CIRC\b|move[lpc]\b)|^\s*\d*:\s*[LCA]\s", re.IGNORECASE
 )
+ASSIGNS = re.compile(r"\s*[\w.$\[\]{}]+\s*:?=")  # no move
 ARC = re.compile(r"\b(?:(?:Move|Arc|Cap|Cut|Disp|Paint|Trigg)C|S?CIRC\b|movec\b)", re.IGNORECASE)
 SPLINE = re.compile(r"^[ \t]*(?P<end>END|PTP_)?SPLINE\b", re.IGNORECASE | re.MULTILINE)
 DIALECTS = (URSCRIPT, KRL, RAPID, FANUC_LS)
@@ -150,8 +151,9 @@ def _seams(text: str, targets: Targets, done: Sequence[bool]) -> tuple[str, ...]
     lines = {
         line_of(text, move.line_start): ok for one, ok in zip(targets.literals, done, strict=True) for move in one.moves
     }
-    lines |= {int(found[1]): False for sentence in targets.skipped if (found := LINE.match(sentence))}
-    written, order = text.splitlines(), sorted(lines)
+    written, found = text.splitlines(), filter(None, map(LINE.match, targets.skipped))
+    lines |= {n: False for n in (int(match[1]) for match in found) if not ASSIGNS.match(written[n - 1])}
+    order = sorted(lines)
     return tuple(
         f"lines {a} and {b}: the one target is corrected, the other is not; the seam between them is neither as taught "
         "nor as planned"

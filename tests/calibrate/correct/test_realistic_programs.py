@@ -188,6 +188,13 @@ def test_a_seam_that_begins_corrected_and_goes_on_as_it_was_is_named():
     assert not corrected(text.replace("movel(pose_trans", "movej(pose_trans"), ".script").seams
 
 
+def test_an_assignment_between_two_moves_is_no_seam():
+    text = f"a = {ur(0)}\nmovel(a)\na[2] = 0.1\nmovel({ur(1)})\n"
+    done = corrected(text, ".script")
+    assert done.skipped[0].startswith("line 3:")
+    assert not done.seams
+
+
 def test_a_target_of_an_instruction_that_nobody_knows_is_listed():
     text = f"MODULE a\n  PROC main()\n    MoveL {abb(0)}, v50, fine, tool0;\n    Glue {abb(1)};\n  ENDPROC\nENDMODULE"
     done = corrected(text, ".mod")
