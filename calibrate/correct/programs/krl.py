@@ -1,7 +1,7 @@
 """KRL of KUKA: aggregates {X .., Y .., Z .., A .., B .., C .., S .., T ..} and {A1 .., ... A6 ..}; mm and degrees.
 
 A, B, C turn about z, y, x. Bit n of T is set where axis n + 1 stands below 0 degrees: it fixes the posture. Taken are
-targets of PTP, LIN, SPTP and SLIN and declared points; tools, bases and relative moves are none.
+targets of PTP, LIN, SPTP, SLIN, SPL and declared points; tools, bases and relative moves are none.
 """
 
 import re
