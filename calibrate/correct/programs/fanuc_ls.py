@@ -8,64 +8,74 @@ import re
 
 import numpy as np
 
-from calibrate.correct.programs.literal import (
-    NUMBER,
-    Dialect,
-    Literal,
-    Move,
-    NamedPose,
-    Span,
-    Targets,
-    instruction,
-    line_of,
-)
+from calibrate.correct.programs.literal import NUMBER, Dialect, Literal, Move, NamedPose, Targets, instruction, line_of
 from calibrate.correct.rotations import FANUC
 
 POSITION = re.compile(r"P\[\s*(?P<number>\d+)[^\]]*\]\s*\{(?P<body>[^}]*)\}")
 FIELD = re.compile(rf"\b(?P<key>X|Y|Z|W|P|R|J[1-9])\s*=\s*(?P<number>{NUMBER})\s*(?P<unit>mm|deg)")
 FRAMES = (("user frame", re.compile(r"UF\s*:\s*(?P<n>\w+)")), ("tool frame", re.compile(r"UT\s*:\s*(?P<n>\w+)")))
+GROUP = re.compile(r"\bGP(?P<n>\d+)\s*:(?P<fields>(?:(?!\bGP\d)[^}])*)")
 # The end of an arc of C stands in a line of its own.
-MOVE = re.compile(r"^[ \t]*(?:\d*:\s*[JLCA]|:)\s+(?P<target>P(?:R)?\[\s*\d+)", re.MULTILINE)
+MOVE = re.compile(r"^[ \t]*(?:\d*:\s*[JLCA]|:)\s+(?P<register>PR?)\[\s*(?P<number>\d*)", re.MULTILINE)
+MOVED = re.compile(r"\b(?:V?OFFSET|TOOL_OFFSET|INC|COORD|RTCP)\b", re.IGNORECASE)
 POSE = ("X", "Y", "Z", "W", "P", "R")
 
 
 def find(text: str, n_joints: int) -> Targets:
-    """Only positions in the listing; position registers are of the controller."""
+    """Only positions in the listing, of motion group 1; position registers are of the controller."""
     begin = text.find("\n/POS")
     body = len(text) if begin < 0 else begin
     by_number: dict[str, list[Move]] = {}
-    skipped: list[str] = []
+    skipped: list[tuple[int, str]] = []
+    left = set[str]()  # numbers of points
     for match in MOVE.finditer(text, 0, body):
-        target = re.sub(r"\s", "", match["target"])
-        if target.startswith("PR["):
-            skipped.append(f"line {line_of(text, match.end())}: position registers are not corrected")
-            continue
-        by_number.setdefault(target[2:], []).append(
-            instruction(text, match.start(), lambda at: (NamedPose(), NamedPose()))
-        )
+        move = instruction(text, match.start("register"), lambda at: (NamedPose(), NamedPose()), ";")
+        written = " ".join(text[match.start("register") : move.line_start + len(move.text)].split())
+        if match["register"] == "PR":
+            skipped.append((match.end(), "position registers are not corrected"))
+        elif not match["number"]:
+            skipped.append((match.end(), f"{written}: its position is chosen while the program runs"))
+        elif found := MOVED.search(re.sub(r"\[[^\]]*\]", "", written)):
+            skipped.append((match.end(), f"{written}: with {found[0]} the place is not that of the position"))
+            left.add(match["number"])
+        else:
+            by_number.setdefault(match["number"], []).append(move)
     literals: list[Literal] = []
     for match in POSITION.finditer(text, body):
-        one = _literal(text, match, tuple(by_number.get(match["number"], ())), n_joints)
-        if one is None:
-            skipped.append(f"P[{match['number']}]: not a whole position in mm and deg; not corrected")
-        else:
+        moves = tuple(by_number.pop(match["number"], ()))
+        one = _literal(text, match, moves, n_joints)
+        if isinstance(one, str):
+            skipped.append((match.start(), f"P[{match['number']}]: {one}; not corrected"))
+        elif moves or match["number"] not in left:
             literals.append(one)
-    return Targets(tuple(literals), tuple(dict.fromkeys(skipped)))
+    absent = ((move.line_start, number) for number, moves in by_number.items() for move in moves)
+    skipped += [(at, f"P[{number}] is not in this file") for at, number in absent]
+    return Targets(tuple(literals), tuple(dict.fromkeys(f"line {line_of(text, at)}: {why}" for at, why in skipped)))
 
 
-def _literal(text: str, match: re.Match[str], moves: tuple[Move, ...], n_joints: int) -> Literal | None:
-    spans: dict[str, Span] = {}
-    numbers: dict[str, float] = {}
-    for field in FIELD.finditer(text, *match.span("body")):
-        if (field["unit"] == "mm") != (field["key"] in "XYZ"):
-            return None
-        spans[field["key"]], numbers[field["key"]] = field.span("number"), float(field["number"])
-    frame, tool = (_place(what, pattern.search(match["body"])) for what, pattern in FRAMES)
+def _literal(text: str, match: re.Match[str], moves: tuple[Move, ...], n_joints: int) -> Literal | str:
+    """Of group 1; else why it is not corrected."""
+    groups = GROUP.finditer(text, *match.span("body"))
+    parts = {group["n"]: group.span("fields") for group in groups} or {"1": match.span("body")}
+    whole = {n: numbers for n, part in parts.items() if (numbers := _numbers(text, part, n_joints))}
+    if "1" not in whole:
+        return "not a whole position of motion group 1 in mm and deg"
+    if len(whole) > 1:
+        return f"motion groups {', '.join(whole)} each hold a whole position, which may be of another arm"
+    joints, fields = whole["1"]
+    frame, tool = (_place(what, pattern.search(text, *parts["1"])) for what, pattern in FRAMES)
+    spans, values = tuple(field.span("number") for field in fields), tuple(float(field["number"]) for field in fields)
+    return Literal(f"P[{match['number']}]", parts["1"][0], spans, values, joints, moves, own=(frame, tool))
+
+
+def _numbers(text: str, part: tuple[int, int], n_joints: int) -> tuple[bool, list[re.Match[str]]] | None:
+    """Whether they are joint angles, and each; None: not a whole position."""
+    found = {field["key"]: field for field in FIELD.finditer(text, *part)}
+    if any((field["unit"] == "mm") != (key in "XYZ") for key, field in found.items()):
+        return None
     for keys, joints in ((POSE, False), (tuple(f"J{j + 1}" for j in range(n_joints)), True)):
-        if all(key in numbers for key in keys):
-            values, places = tuple(numbers[k] for k in keys), tuple(spans[k] for k in keys)
-            name = f"P[{match['number']}]"
-            return Literal(name, match.start("body"), places, values, joints, moves, own=(frame, tool))
+        if all(key in found for key in keys):
+            return joints, [found[key] for key in keys]
     return None
 
 

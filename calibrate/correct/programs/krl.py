@@ -1,12 +1,13 @@
 """KRL of KUKA: aggregates {X .., Y .., Z .., A .., B .., C .., S .., T ..} and {A1 .., ... A6 ..}; mm and degrees.
 
 A, B, C turn about z, y, x. Bit n of T is set where axis n + 1 stands below 0 degrees: it fixes the posture. Taken are
-targets of PTP, LIN, SPTP and SLIN and declared points; tools, bases and relative moves are none.
+targets of PTP, LIN, SPTP, SLIN, SPL and declared points; tools, bases and relative moves are none.
 """
 
 import re
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -14,38 +15,51 @@ from numpy.typing import NDArray
 
 from calibrate.correct.corrected import Branch
 from calibrate.correct.programs import literal
+from calibrate.correct.programs.stated_frames import Event, Used, routines_of, set_above, words_of
 from calibrate.correct.rotations import KUKA
 
 Floats = NDArray[np.float64]
 
+LINES = re.IGNORECASE | re.MULTILINE
 AGGREGATE = r"\{(?:\s*(?:E6POS|E6AXIS|POS|AXIS|FRAME)\s*:)?(?P<fields>[^{}\[\]]*)\}"
-FIELD = re.compile(rf"\b(?P<key>[A-Z]\w*)\s+(?P<number>{literal.NUMBER}|'B[01]+')", re.IGNORECASE)
+FIELD = re.compile(rf"\b(?P<key>[A-Z]\w*)\s+(?P<number>{literal.NUMBER}|'B[01]+')(?=\s*(?:[,}}]|$))", re.IGNORECASE)
 NAME = r"[A-Za-z_]\w*(?:\[[^\]]*\])?"
-INLINE = re.compile(rf"^[ \t]*S?(?:PTP|LIN|CIRC)\s+{AGGREGATE}", re.IGNORECASE | re.MULTILINE)
+GOES = r"^[ \t]*(?:S?(?:PTP|LIN|CIRC)|SPL)"
+# Geometric operators make another target of a point.
+ONE = rf"(?:{NAME}|\{{[^{{}}]*\}})"
+TIMES = rf"(?:[ \t]*:[ \t]*{ONE})*"
+INLINE = re.compile(rf"{GOES}\s+{AGGREGATE}(?!\s*:)", LINES)
 # An arc has two targets: the auxiliary point, and its end.
-ARC = r"^[ \t]*S?CIRC\s+(?:" + NAME + r"|\{[^{}]*\})\s*,\s*"
-INLINE_END = re.compile(ARC + AGGREGATE, re.IGNORECASE | re.MULTILINE)
+ARC = rf"^[ \t]*S?CIRC\s+{ONE}{TIMES}\s*,\s*"
+INLINE_END = re.compile(rf"{ARC}{AGGREGATE}(?!\s*:)", LINES)
 ARRAY = re.compile(r"\b(?:E6POS|E6AXIS|POS|AXIS)\s+(?P<name>\w+)\s*\[", re.IGNORECASE)
-ELEMENT = re.compile(
-    rf"^[ \t]*(?P<name>(?P<array>\w+)\s*\[\s*\d+\s*\])\s*=\s*{AGGREGATE}", re.IGNORECASE | re.MULTILINE
-)
+ELEMENT = re.compile(rf"^[ \t]*(?P<name>(?P<array>\w+)\s*\[\s*\d+\s*\])\s*=\s*{AGGREGATE}", LINES)
 DECLARED = re.compile(
-    rf"^[ \t]*(?:DECL\s+)?(?:GLOBAL\s+)?(?:CONST\s+)?(?:E6POS|E6AXIS|POS|AXIS)\s+(?P<name>\w+)\s*=\s*{AGGREGATE}",
-    re.IGNORECASE | re.MULTILINE,
+    rf"^[ \t]*(?:DECL\s+)?(?:GLOBAL\s+)?(?:CONST\s+)?(?:E6POS|E6AXIS|POS|AXIS)\s+(?P<name>\w+)\s*=\s*{AGGREGATE}", LINES
 )
-MOVE = re.compile(rf"^[ \t]*S?(?:PTP|LIN|CIRC)\s+(?P<target>{NAME})", re.IGNORECASE | re.MULTILINE)
-ARC_END = re.compile(rf"{ARC}(?P<target>{NAME})", re.IGNORECASE | re.MULTILINE)
-OTHER = re.compile(r"^[ \t]*S?(?:PTP_REL|LIN_REL|CIRC_REL)\b", re.IGNORECASE | re.MULTILINE)
-ROUTINE = re.compile(r"^[ \t]*(?:GLOBAL\s+)?DEF(?:FCT\s+\w+)?\s+(?P<routine>\w+)\s*\(", re.IGNORECASE | re.MULTILINE)
+TARGET = rf"(?P<target>\{{|{NAME}{TIMES})"
+MOVE = re.compile(rf"{GOES}\s+{TARGET}", LINES)
+ARC_END = re.compile(rf"{ARC}{TARGET}", LINES)
+OTHER = re.compile(rf"{GOES}_REL\b", LINES)
+ROUTINE = re.compile(r"^[ \t]*(?:GLOBAL\s+)?DEF(?:FCT\s+\w+)?\s+(?P<name>\w+)\s*\((?P<parameters>[^)]*)", LINES)
+WAY = re.compile(
+    r"^[ \t]*(?:(?P<loop>FOR|WHILE|REPEAT|LOOP)|(?P<if>IF|SWITCH)|(?P<scope>(?:PTP_)?SPLINE)|(?P<else>CASE)"
+    r"|(?P<otherwise>ELSE|DEFAULT)|(?P<end>END(?:FOR|WHILE|LOOP|IF|SWITCH|SPLINE|FCT)?|UNTIL)"
+    r"|(?P<return>RETURN)|(?P<break>EXIT))\b",
+    LINES,
+)
 SET = re.compile(
-    r"\$(?P<what>BASE|TOOL)(?:\.\w+)?\s*=\s*(?P<value>[^\n]*)|\bBAS\s*\(\s*#(?P<kind>BASE|TOOL)\s*,\s*(?P<number>\w+)\s*\)"
-    r"|\bFDAT_ACT\s*=\s*(?P<inline>\w+)",
+    r"\$(?P<what>BASE|TOOL)(?:\.\w+)?[ \t]*=(?!=)[ \t]*(?P<value>(?:\{[^{}\n]*\}|\([^()\n]*\)|[^\n,])*)"
+    r"|\bBAS\s*\(\s*#(?P<kind>BASE|TOOL)\s*,\s*(?P<number>\w+)\s*\)|\bFDAT_ACT\s*=\s*(?P<inline>\w+)",
     re.IGNORECASE,
 )
-HELD = re.compile(rf"(?<!\w)(?P<name>\$?\w+(?:[ \t]*\[[ \t]*\d+[ \t]*\])?)\s*=\s*{AGGREGATE}", re.IGNORECASE)
+WITH = re.compile(rf"{GOES}\b[^\n]*?\bWITH\b[^\n]*", LINES)
+HELD = re.compile(rf"(?<!\w)(?P<name>\$?\w+(?:[ \t]*\[[ \t]*\d+[ \t]*\])?)\s*=\s*{AGGREGATE}(?!\s*:)", re.IGNORECASE)
 INLINE_DATA = re.compile(r"\bFDAT\s+(?P<name>\w+)\s*=\s*\{(?P<fields>[^{}]*)\}", re.IGNORECASE)
+CHANGED = re.compile(r"(?<![\w$.])(?P<name>\$?\w+(?:[ \t]*\[[^\]\n]*\])?)(?:\.\w+)*[ \t]*=(?!=)", re.IGNORECASE)
+CHOSEN = re.compile(r"\[(?!\d+\])")  # an index that is no number
+INLINE_FORM = re.compile(r"S(?:BASE|TOOL2?)\s*\(\s*(?P<name>\w+)\s*\)\s*", re.IGNORECASE)
 FIXED = re.compile(r"\$IPO_MODE\s*=\s*#TCP|IPO_FRAME\s+#TCP", re.IGNORECASE)
-Used = tuple[literal.NamedPose, literal.NamedPose]  # base and tool
 POSE = ("X", "Y", "Z", "A", "B", "C")
 
 
@@ -66,24 +80,21 @@ def find(text: str, n_joints: int) -> literal.Targets:
         else:
             name = match["name"]
             moves = literal.moves_to(by_name, name)
-        own = None if inline else inline_data.get("F" + name.upper().removeprefix("X"))
+        alone = any(WITH.match(move.text) and SET.search(move.text) for move in moves)
+        own = None if inline or alone else inline_data.get("F" + name.upper().removeprefix("X"))
         one = _literal(text, match, name, moves, n_joints, own)
-        if one is None:
-            skipped.append(f"{name}: an aggregate that does not state the whole target is not corrected")
-        else:
+        if one is None and not inline:
+            why = f"{name}: an aggregate that does not state the whole target is not corrected"
+            skipped.append(f"line {literal.line_of(text, match.start('fields'))}: {why}")
+        elif one is not None:
             literals.append(one)
     others = ((m.end(), f"{m.group().strip()}: relative moves are not corrected") for m in OTHER.finditer(code))
-    skipped += literal.sentences(text, by_name, literals, others)
+    skipped += literal.sentences(code, by_name, literals, CHANGED, others)
     return literal.Targets(tuple(sorted(literals, key=lambda one: one.at)), tuple(skipped))
 
 
 def _literal(
-    text: str,
-    match: re.Match[str],
-    name: str,
-    moves: tuple[literal.Move, ...],
-    n_joints: int,
-    own: tuple[literal.NamedPose, literal.NamedPose] | None,
+    text: str, match: re.Match[str], name: str, moves: tuple[literal.Move, ...], n_joints: int, own: Used | None
 ) -> literal.Literal | None:
     begin = match.start("fields")
     fields = _fields(text, *match.span("fields"))
@@ -124,15 +135,49 @@ def _turn(span: literal.Span, number: float) -> tuple[Branch, literal.Turns]:
     return asked, turns
 
 
-def _places(code: str) -> tuple[literal.Places, dict[str, tuple[literal.NamedPose, literal.NamedPose]]]:
-    """Frame and tool of an instruction, as its routine has set them last above; those of inline forms by FDAT name."""
-    held, times = dict[str, Floats](), Counter[str]()
-    for match in HELD.finditer(code):
-        fields, name = _fields(code, *match.span("fields")), _key(match["name"])
-        times[name] += 1
-        if all(key in fields for key in POSE):
-            held[name] = KRL.frame([fields[key][1] for key in POSE])
-    events = sorted((*ROUTINE.finditer(code), *SET.finditer(code)), key=lambda event: event.start())
+def _places(code: str) -> tuple[literal.Places, dict[str, Used]]:
+    """Base and tool of an instruction, as the program has set them on its way there; of inline forms by FDAT name."""
+    place = _poses(code)
+    nothing = place("", "")
+    inline = dict[str, Used]()
+    for match in INLINE_DATA.finditer(code):
+        numbers = {key: f"{number:.0f}" for key, (_, number) in _fields(code, *match.span("fields")).items()}
+        base, tool = (place(what, f"{what}_DATA[{numbers.get(what + '_NO')}]") for what in ("BASE", "TOOL"))
+        inline[match["name"].upper()] = (base, tool)
+
+    def poses(match: re.Match[str]) -> tuple[literal.NamedPose | None, literal.NamedPose | None]:
+        value = match["value"] or ""
+        form = INLINE_FORM.fullmatch(value)
+        fdat = match["inline"] or (form and form["name"])
+        unknown = replace(nothing, name=f"FDAT {fdat}")
+        base, tool = inline.get(fdat.upper(), (unknown, unknown)) if fdat else (None, None)
+        what = (match["what"] or match["kind"] or "").upper()
+        pose = place(what, value or f"{what}_DATA[{match['number']}]")
+        return (None if what == "TOOL" else base or pose), (None if what == "BASE" else tool or pose)
+
+    alone = {match.start(): match.end() for match in WITH.finditer(code)}
+    ways = routines_of(code, ROUTINE, WAY)
+    sets: tuple[list[Event], list[Event]] = ([], [])
+    for match in SET.finditer(code):
+        if literal.line_start(code, match.start()) not in alone:
+            words = words_of(re.sub(r"\{.*", "", match["value"] or match["number"] or ""))
+            for events, pose in zip(sets, poses(match), strict=True):
+                events += [Event(match.start(), "set", "", pose, words)] if pose else []
+    base_at, tool_at = (set_above([*ways, *sets[k]], nothing, word) for k, word in enumerate(("base", "tool")))
+
+    def places(at: int) -> Used:
+        base, tool = base_at(at), tool_at(at)
+        for match in SET.finditer(code, at, alone.get(at, at)):  # for this one move
+            base, tool = (new or old for new, old in zip(poses(match), (base, tool), strict=True))
+        return base, tool
+
+    return places, inline
+
+
+def _poses(code: str) -> Callable[[str, str], literal.NamedPose]:
+    """Of what a base or tool is set to: a frame of the file with one value, or a literal; each is read once."""
+    held = {_key(match["name"]): _frame(code, *match.span("fields")) for match in HELD.finditer(code)}
+    times = Counter(_key(match["name"]) for match in CHANGED.finditer(code))
     fixed = "the tool is stationary (#TCP), which is not corrected" if FIXED.search(code) else ""
 
     @cache
@@ -140,61 +185,18 @@ def _places(code: str) -> tuple[literal.Places, dict[str, tuple[literal.NamedPos
         name = _key(value)
         if name in ("$NULLFRAME", "$WORLD", f"{what}_DATA[0]"):
             return literal.NamedPose(name, np.eye(4), fixed)
-        fields = _fields(value, 0, len(value)) if value.lstrip().startswith("{") else {}
-        if all(key in fields for key in POSE):
-            return literal.NamedPose(f"${what}", KRL.frame([fields[key][1] for key in POSE]), fixed)
-        return literal.NamedPose(name, held.get(name) if times[name] == 1 else None, fixed)
+        written = re.fullmatch(AGGREGATE, value.rstrip(), re.IGNORECASE)
+        if written and (T := _frame(value, *written.span("fields"))) is not None:
+            return literal.NamedPose(f"${what}", T, fixed)
+        chosen = f"the pose of {name} is chosen while the program runs" if CHOSEN.search(name) else ""
+        return literal.NamedPose(name, held.get(name) if times[name] == 1 else None, fixed or chosen)
 
-    inline = dict[str, tuple[literal.NamedPose, literal.NamedPose]]()
-    for match in INLINE_DATA.finditer(code):
-        numbers = {key: f"{number:.0f}" for key, (_, number) in _fields(code, *match.span("fields")).items()}
-        base, tool = (place(what, f"{what}_DATA[{numbers.get(what + '_NO')}]") for what in ("BASE", "TOOL"))
-        inline[match["name"].upper()] = (base, tool)
-
-    nothing: Used = (literal.NamedPose(refused=fixed), literal.NamedPose(refused=fixed))
-    starts = [event.start() for event in events]
-
-    def states(entered: Mapping[str, Used]) -> list[Used]:
-        out, (base, tool) = list[Used](), nothing
-        for event in events:
-            if event.re is ROUTINE:
-                base, tool = entered.get(event["routine"].lower(), nothing)
-            elif event["inline"]:
-                unknown = (literal.NamedPose(f"FDAT {event['inline']}", None, fixed),) * 2
-                base, tool = inline.get(event["inline"].upper(), unknown)
-            else:
-                what = (event["what"] or event["kind"]).upper()
-                pose = place(what, event["value"] or f"{what}_DATA[{event['number']}]")
-                base, tool = (pose, tool) if what == "BASE" else (base, pose)
-            out.append((base, tool))
-        return out
-
-    alone = states({})
-    entered = {
-        event["routine"].lower(): uses[0]
-        for event in events
-        if event.re is ROUTINE
-        and (uses := [literal.last_before(alone, starts, at, nothing) for at in _calls(code, event["routine"])])
-        and all(_alike(use, uses[0]) for use in uses)
-    }
-    known = states(entered)
-    return lambda at: literal.last_before(known, starts, at, nothing), inline
+    return place
 
 
-def _calls(code: str, routine: str) -> list[int]:
-    """Where a routine of the file is called."""
-    call = re.compile(rf"(?<![\w$]){routine}\s*\(", re.IGNORECASE)
-    begun = {match.start("routine") for match in ROUTINE.finditer(code)}
-    return [match.start() for match in call.finditer(code) if match.start() not in begun]
-
-
-def _alike(one: Used, other: Used) -> bool:
-    """The same names, hence the same poses, which a file states once; poses without a name by their numbers."""
-    return all(a.name == b.name and _places_of(a) == _places_of(b) for a, b in zip(one, other, strict=True))
-
-
-def _places_of(place: literal.NamedPose) -> list[float]:
-    return [] if place.T is None else place.T.ravel().tolist()
+def _frame(text: str, begin: int, end: int) -> Floats | None:
+    fields = _fields(text, begin, end)
+    return KRL.frame([fields[key][1] for key in POSE]) if all(key in fields for key in POSE) else None
 
 
 def _key(name: str) -> str:

@@ -23,7 +23,8 @@ UNIT = 1e-2  # by which the length of a quaternion may differ from 1: rounding o
 EDGE_RAD = 1e-3  # across the edge of a quarter turn, or of the sign of an axis, an angle may be by rounding of its pose
 
 NUMBER = r"[-+]?(?:\d++(?:\.\d*+)?|\.\d++)(?:[eE][-+]?\d++)?"  # no number is tried again, digit by digit
-ELEMENT = re.compile(r"(\w+)[\[{](.*)[\]}]")  # of an array: its name and index
+ELEMENT = re.compile(r"(\w+)[\[{]([^:]*)[\]}]")  # of an array: its name and index
+OPENING = re.compile(r"[\s\[{]*(?:\w+\s*:)?\s*")  # before the first number of what is written out
 LONGEST_MOVE = 500  # letters that are read of an instruction; with a target in it one has some 200
 
 
@@ -174,10 +175,11 @@ def instruction(text: str, at: int, places: Places, end: str = "\n") -> Move:
 
 
 def moves_of(text: str, code: str, patterns: Sequence[re.Pattern[str]], places: Places, end: str = "\n") -> Moves:
-    """By what an instruction moves to, the group `target` of a pattern."""
+    """By what an instruction moves to, the group `target` of a pattern; by its place where it is written out there."""
     found: Moves = {}
     for match in (m for pattern in patterns for m in pattern.finditer(code)):
-        found.setdefault(key(match["target"]), []).append(instruction(text, match.start(), places, end))
+        name = str(match.start("target")) if match["target"][-1] in "[{" else key(match["target"])
+        found.setdefault(name, []).append(instruction(text, match.start(), places, end))
     return found
 
 
@@ -200,18 +202,32 @@ def moves_to(by_name: Moves, name: str) -> tuple[Move, ...]:
 
 
 def sentences(
-    text: str, by_name: Moves, literals: Sequence[Literal], others: Iterable[tuple[int, str]]
+    code: str, by_name: Moves, literals: Sequence[Literal], changed: re.Pattern[str], others: Iterable[tuple[int, str]]
 ) -> tuple[str, ...]:
-    """On moves whose target is not among the literals, and on `others`: where they stand, and why."""
+    """On moves to what is none of the literals, on assignments that `changed` one, and on `others`: where, and why."""
     known = {key(one.name) for one in literals}
     arrays = {element[1] for name in known if (element := ELEMENT.fullmatch(name))}
     known |= {t for t in by_name if (e := ELEMENT.fullmatch(t)) and e[1] in arrays and not e[2].isdigit()}
+    begins = sorted(one.at for one in literals)
+
+    def written_out(at: int) -> bool:
+        k = bisect_left(begins, at)
+        return k < len(begins) and OPENING.fullmatch(code, at, begins[k]) is not None
+
     elsewhere = [
         (move.line_start, f"{' '.join(move.text.split())}: its target is no literal of this file")
         for target, moves in by_name.items()
-        if target not in known
+        if target not in known and not (target.isdigit() and written_out(int(target)))
         for move in moves
     ]
-    told = {line_of(text, at) for at, _ in elsewhere}
-    more = [(at, why) for at, why in others if line_of(text, at) not in told]  # an instruction is listed once
-    return tuple(dict.fromkeys(f"line {line_of(text, at)}: {why}" for at, why in (*elsewhere, *more)))
+    used = {key(one.name) for one in literals if one.moves}
+    for match in changed.finditer(code):
+        name = key(match["name"])
+        if (element := ELEMENT.fullmatch(name)) and (element[1] not in arrays or not element[2].isdigit()):
+            name = element[1]  # a number of a pose, or an element that only its index at run time chooses
+        if name in used | arrays and not written_out(match.end()):
+            line = code[match.start("name") :].split("\n", 1)[0]
+            elsewhere.append((match.start("name"), f"{shown(line)}: changes a target while the program runs"))
+    listed = {line_of(code, at) for at, _ in elsewhere}
+    more = [(at, why) for at, why in others if line_of(code, at) not in listed]  # an instruction is listed once
+    return tuple(dict.fromkeys(f"line {line_of(code, at)}: {why}" for at, why in (*elsewhere, *more)))

@@ -34,7 +34,8 @@ OBJECT = re.compile(
 TOOL = re.compile(
     rf"\btooldata\s+(?P<name>\w+)\s*:=\s*\[\s*(?P<held>\w+)\s*,\s*\[\s*(?P<frame>{POSE})\s*\]", re.IGNORECASE
 )
-ASSIGNED = re.compile(r"\b(?P<name>\w++)(?:\.\w++)*+\s*+:=")
+ASSIGNED = re.compile(r"\b(?P<name>\w++(?:\{[^{};]*\})?)(?:\.\w++)*+\s*+:=")
+PARAMETER = re.compile(r"\b(?:wobjdata|tooldata)\s+(?P<name>\w+)\s*[,)|]", re.IGNORECASE)
 USED = re.compile(r"\\WObj\s*:=\s*(?P<name>\w+)", re.IGNORECASE)
 SHIFTED = re.compile(r"\bPDisp(?:Set|On)\b", re.IGNORECASE)
 NAMED = re.compile(
@@ -43,11 +44,11 @@ NAMED = re.compile(
 PROCESS = r"(?:Arc|Cap|Cut|Disp|Paint|Spot|Trigg)[JLC]\w*"  # moves of the options: their target comes first, too
 INSTRUCTION = rf"\b(?:Move\w+|{PROCESS})\s+(?:\\\w+\s*,\s*)?"
 NAME = r"[A-Za-z_]\w*(?:\{[^{}]*\})?"
-MOVE = re.compile(rf"{INSTRUCTION}(?P<target>{NAME})", re.IGNORECASE)
+MOVE = re.compile(rf"{INSTRUCTION}(?P<target>\[|{NAME})", re.IGNORECASE)
 # An arc has two targets: the point on the circle, and its end.
 ROUND = r"\b(?:Move|Arc|Cap|Cut|Disp|Paint|Trigg)C\w*\s+(?:\\\w+\s*,\s*)?"
-ARC = rf"{ROUND}(?:{NAME}|{ROBTARGET.replace('?P<pose>', '?:')})\s*,\s*"
-ARC_END = re.compile(rf"{ARC}(?P<target>{NAME})", re.IGNORECASE)
+ARC = rf"{ROUND}(?:{NAME}(?:\((?:[^();]|\([^();]*\))*\))?|{ROBTARGET.replace('?P<pose>', '?:')})\s*,\s*"
+ARC_END = re.compile(rf"{ARC}(?P<target>\[|{NAME})", re.IGNORECASE)
 INLINE = re.compile(rf"(?:{INSTRUCTION}|{ARC})$", re.IGNORECASE)
 REST = re.compile(r"\bMove\w+\s+(?:\[.*\]\]|\w+)\s*(?P<rest>(?:\\[^,]*)?,.*;)", re.IGNORECASE)
 LONGEST = 400  # letters between the beginning of a move and its last target
@@ -70,11 +71,10 @@ def find(text: str, n_joints: int) -> literal.Targets:
         elif inline:
             moves = (literal.instruction(text, first + inline.start(), places, ";"),)
             literals.append(_literal(text, match, f"line {literal.line_of(text, match.start())}", moves))
-    skipped = literal.sentences(text, by_name, literals, literal.unread(text, code, TARGET, literals))
+    skipped = literal.sentences(code, by_name, literals, ASSIGNED, literal.unread(text, code, TARGET, literals))
     if SHIFTED.search(code):
-        return literal.Targets(
-            (), ("the program displaces its targets (PDispSet, PDispOn), which is not corrected", *skipped)
-        )
+        why = "the program displaces its targets (PDispSet, PDispOn), which is not corrected"
+        return literal.Targets((), (why, *skipped))
     if n_joints != 6:
         return literal.Targets((), (*skipped, f"RAPID targets have six axes, this arm has {n_joints}"))
     return literal.Targets(tuple(literals), skipped)
@@ -130,6 +130,8 @@ def _places(code: str) -> literal.Places:
         elif not is_object and match["held"].upper() != "TRUE":
             why = f"tool {name} is stationary, which is not corrected"
         held[name.lower()] = literal.NamedPose(name, None if assigned else pose, why)
+    for match in PARAMETER.finditer(code):
+        held[match["name"].lower()] = literal.NamedPose(refused=f"{match['name']} is a parameter of its routine")
 
     def places(at: int) -> tuple[literal.NamedPose, literal.NamedPose]:
         end = code.find(";", at, at + literal.LONGEST_MOVE)

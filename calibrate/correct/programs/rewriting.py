@@ -5,6 +5,7 @@ The prediction is made of the numbers as they are written, rounding included.
 
 import difflib
 import re
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -27,7 +28,7 @@ from calibrate.correct.corrected import (
 )
 from calibrate.correct.programs.fanuc_ls import FANUC_LS
 from calibrate.correct.programs.krl import KRL
-from calibrate.correct.programs.literal import Dialect, Literal, Targets, line_of
+from calibrate.correct.programs.literal import Dialect, Literal, Move, Targets, last_before, line_of
 from calibrate.correct.programs.rapid import RAPID
 from calibrate.correct.programs.stated_frames import stated
 from calibrate.correct.programs.urscript import URSCRIPT
@@ -42,6 +43,9 @@ LINE = re.compile(r"line (\d+)\b")
 ALONG = re.compile(
     r"\b(?:(?:Move|Arc|Cap|Cut|Disp|Paint|Trigg)[LC]|S?LIN\b|S?CIRC\b|move[lpc]\b)|^\s*\d*:\s*[LCA]\s", re.IGNORECASE
 )
+ASSIGNS = re.compile(r"\s*[\w.$\[\]{}]+\s*:?=")  # no move
+ARC = re.compile(r"\b(?:(?:Move|Arc|Cap|Cut|Disp|Paint|Trigg)C|S?CIRC\b|movec\b)", re.IGNORECASE)
+SPLINE = re.compile(r"^[ \t]*(?P<end>END|PTP_)?SPLINE\b", re.IGNORECASE | re.MULTILINE)
 DIALECTS = (URSCRIPT, KRL, RAPID, FANUC_LS)
 
 
@@ -100,7 +104,7 @@ def correct_program(
     targets, base, tool = stated(replace(targets, literals=some), text, frame, options.tool, arms.stated_tool, name)
     options = replace(options, tool=tool)
     arms = Arms.of(model, options)
-    _check(targets, dialect, options, name)
+    _check(targets, dialect, options, text, name)
     if not all((np.abs(T[..., :3, :]) <= LENGTH_M).all() for T in (base, tool) if T is not None):
         raise DataError(f"{name}: a frame or tool has a number beyond {LENGTH_M / 1e3:g} km; correct it")
     wanted = _wanted(targets.literals, dialect, arms, base, near_rad, every)
@@ -147,8 +151,9 @@ def _seams(text: str, targets: Targets, done: Sequence[bool]) -> tuple[str, ...]
     lines = {
         line_of(text, move.line_start): ok for one, ok in zip(targets.literals, done, strict=True) for move in one.moves
     }
-    lines |= {int(found[1]): False for sentence in targets.skipped if (found := LINE.match(sentence))}
-    written, order = text.splitlines(), sorted(lines)
+    written, found = text.splitlines(), filter(None, map(LINE.match, targets.skipped))
+    lines |= {n: False for n in (int(match[1]) for match in found) if not ASSIGNS.match(written[n - 1])}
+    order = sorted(lines)
     return tuple(
         f"lines {a} and {b}: the one target is corrected, the other is not; the seam between them is neither as taught "
         "nor as planned"
@@ -157,7 +162,7 @@ def _seams(text: str, targets: Targets, done: Sequence[bool]) -> tuple[str, ...]
     )
 
 
-def _check(targets: Targets, dialect: Dialect, options: Options, name: str) -> None:
+def _check(targets: Targets, dialect: Dialect, options: Options, text: str, name: str) -> None:
     if not targets.literals:
         why = f"; {targets.skipped[0]}" if targets.skipped else ""
         raise DataError(f"{name}: no target of {dialect.name} that could be corrected{why}")
@@ -173,6 +178,20 @@ def _check(targets: Targets, dialect: Dialect, options: Options, name: str) -> N
         )
     if options.approach and dialect.overshoot is None:
         raise DataError(f"{name}: overshoot points cannot be inserted into {dialect.name}; leave --approach out")
+    if options.approach:
+        _check_overshoots([move for one in targets.literals for move in one.moves], text, name)
+
+
+def _check_overshoots(moves: Sequence[Move], text: str, name: str) -> None:
+    """A move before an arc, within a spline, or to another target than the next one would lead along another path."""
+    marks = {mark.start(): (mark["end"] or "").upper() != "END" for mark in SPLINE.finditer(text)}
+    inside, starts, targets = list(marks.values()), list(marks), Counter(move.line_start for move in moves)
+    for move in moves:
+        spline, arc = last_before(inside, starts, move.line_start, False), ARC.search(re.split("[;#!]", move.text)[0])
+        if spline or arc or targets[move.line_start] > 1:
+            why = "within a spline" if spline else "along an arc" if arc else "to one of several targets"
+            line = f"{name}: line {line_of(text, move.line_start)}"
+            raise DataError(f"{line}: no overshoot point can stand before a move {why}; leave --approach out")
 
 
 def _in_bounds(one: Literal, dialect: Dialect) -> bool:

@@ -10,20 +10,31 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from calibrate.correct.programs import literal
+from calibrate.correct.programs.stated_frames import Event, routines_of, set_above, words_of
 from calibrate.correct.rotations import VECTOR
 
 LIST = rf"(?P<pose>p?)\[\s*{literal.NUMBER}(?:\s*,\s*{literal.NUMBER})*\s*\]"
 NAME = r"[A-Za-z_]\w*(?:\[[^\[\]]*\])?"
-MOVE = re.compile(rf"\b(?:movej|movel|movep|servoj|movec)\s*\(\s*(?:\w+\s*=\s*)?(?P<target>p?\[|{NAME})")
-INLINE = re.compile(rf"\b(?:movej|movel|movep|servoj|movec)\s*\(\s*(?:\w+\s*=\s*)?{LIST}")
+CALLED = r"(?:\((?:[^()\n]|\([^()\n]*\))*\))?"
+GOES = r"\b(?:movej|movel|movep|servoj|servoc|movec)\s*\(\s*(?:\w+\s*=\s*)?"
+MOVE = re.compile(rf"{GOES}(?P<target>p?\[|{NAME})")
+INLINE = re.compile(rf"{GOES}{LIST}")
 # An arc has two targets: a point on it, and its end.
-ARC = rf"\bmovec\s*\(\s*(?:\w+\s*=\s*)?(?:{NAME}|p\[[^\[\]]*\])\s*,\s*(?:\w+\s*=\s*)?"
+ARC = rf"\bmovec\s*\(\s*(?:\w+\s*=\s*)?(?:{NAME}{CALLED}|p\[[^\[\]]*\])\s*,\s*(?:\w+\s*=\s*)?"
 ARC_END = re.compile(rf"{ARC}(?P<target>p?\[|{NAME})")
 INLINE_END = re.compile(ARC + LIST)
 POSE = re.compile(rf"(?<!\w)(?P<pose>p)\[\s*{literal.NUMBER}(?:\s*,\s*{literal.NUMBER}){{5}}\s*\]")
 ARRAY = re.compile(r"(?<!\w)(?P<name>[A-Za-z_]\w*)\s*=\s*\[\s*(?=p\[)")
 ASSIGNED = re.compile(rf"(?<!\w)(?P<name>[A-Za-z_]\w*)\s*=\s*{LIST}")
-TCP = re.compile(rf"\bset_tcp\s*\(\s*(?P<literal>{LIST}\s*\))?")
+CHANGED = re.compile(
+    r"^[ \t]*(?:(?:global|local)[ \t]+)?(?P<name>[A-Za-z_]\w*(?:\[[^\[\]\n]*\])?)[ \t]*=(?!=)[ \t]*", re.MULTILINE
+)
+ROUTINE = re.compile(r"^[ \t]*(?:def|thread|sec)\s+(?P<name>\w+)\s*\((?P<parameters>[^)]*)", re.MULTILINE)
+WAY = re.compile(
+    r"(?<![\w.])(?:(?P<loop>while)|(?P<if>if)|(?P<else>elif)|(?P<otherwise>else)|(?P<end>end)|(?P<return>return)"
+    r"|(?P<break>break|continue))\b"
+)
+TCP = re.compile(rf"\bset_tcp\s*\(\s*(?:(?P<literal>{LIST}\s*\))|(?P<words>[^\n]*))")
 
 
 def find(text: str, n_joints: int) -> literal.Targets:
@@ -40,25 +51,25 @@ def find(text: str, n_joints: int) -> literal.Targets:
         if moves := literal.moves_to(by_name, name):
             literals.append(_literal(text, match, name, moves))
     good = [one for one in literals if len(one.numbers) == (n_joints if one.joints else 6)]
-    by_name = {target: moves for target, moves in by_name.items() if target not in ("[", "p[")}
     tools = [match.span() for match in TCP.finditer(code)]
-    left = [
-        one for one in literal.unread(text, code, POSE, good) if not any(begin <= one[0] < end for begin, end in tools)
-    ]
-    skipped = literal.sentences(text, by_name, good, left)
+    unread = literal.unread(text, code, POSE, good)
+    left = (one for one in unread if not any(begin <= one[0] < end for begin, end in tools))
+    skipped = literal.sentences(code, by_name, good, CHANGED, left)
     return literal.Targets(tuple(sorted(good, key=lambda one: one.at)), skipped)
 
 
 def _places(code: str) -> literal.Places:
-    """Poses are in the base, with the tool centre point that was set last above."""
-    base = literal.NamedPose("base", np.eye(4))
-    starts, tools = list[int](), list[literal.NamedPose]()
-    for match in TCP.finditer(code):
+    """Poses are in the base, with the tool centre point that is set on the way there."""
+    base, tools = literal.NamedPose("base", np.eye(4)), list(TCP.finditer(code))
+    # The first function is the program; others that nothing here calls are called by what is not in the file.
+    events = routines_of(code, ROUTINE, WAY, literal.NamedPose("the caller") if tools else None)
+    for match in tools:
         numbers = [v for _, v in literal.numbers_in(code, *match.span("literal"))] if match["literal"] else []
         line = f"set_tcp of line {literal.line_of(code, match.start())}"
-        starts.append(match.start())
-        tools.append(literal.NamedPose(line, URSCRIPT.frame(numbers) if len(numbers) == 6 else None))
-    return lambda at: (base, literal.last_before(tools, starts, at, literal.NamedPose()))
+        tool = literal.NamedPose(line, URSCRIPT.frame(numbers) if len(numbers) == 6 else None)
+        events.append(Event(match.start(), "set", "", tool, words_of(match["words"] or "")))
+    above = set_above(events, literal.NamedPose(), "tool")
+    return lambda at: (base, above(at))
 
 
 def _elements(code: str, array: re.Match[str]) -> Iterator[tuple[int, re.Match[str]]]:

@@ -188,6 +188,13 @@ def test_a_seam_that_begins_corrected_and_goes_on_as_it_was_is_named():
     assert not corrected(text.replace("movel(pose_trans", "movej(pose_trans"), ".script").seams
 
 
+def test_an_assignment_between_two_moves_is_no_seam():
+    text = f"a = {ur(0)}\nmovel(a)\na[2] = 0.1\nmovel({ur(1)})\n"
+    done = corrected(text, ".script")
+    assert done.skipped[0].startswith("line 3:")
+    assert not done.seams
+
+
 def test_a_target_of_an_instruction_that_nobody_knows_is_listed():
     text = f"MODULE a\n  PROC main()\n    MoveL {abb(0)}, v50, fine, tool0;\n    Glue {abb(1)};\n  ENDPROC\nENDMODULE"
     done = corrected(text, ".mod")
@@ -220,5 +227,35 @@ def test_a_routine_has_the_base_of_its_callers_where_they_agree(second, count):
     if count:
         assert corrected(text, ".src").frames[0][0, 3] == pytest.approx(0.1)
     else:
-        with pytest.raises(DataError, match="sets no frame"):
+        with pytest.raises(DataError, match="not the same at all calls"):
             corrected(text, ".src")
+
+
+def points(*names):
+    return "".join(f"DECL E6POS {name} = {kuka(k)}\n" for k, name in enumerate(names))
+
+
+WITHIN_PATHS = {  # text, line of the move before which nothing can be inserted
+    "circ": (".src", f"BAS(#BASE, 0)\nPTP {kuka(0)}\nCIRC {kuka(1)}, {kuka(2)}\n", 3),
+    "points of circ": (".src", f"BAS(#BASE, 0)\nSCIRC XP1, XP2\n{points('XP1', 'XP2')}", 2),
+    "end of circ": (".src", f"BAS(#BASE, 0)\nCIRC XP7, {kuka(2)}\n", 2),
+    "spline": (".src", f"BAS(#BASE, 0)\nSPLINE\nSLIN {kuka(0)}\nENDSPLINE\n", 3),
+    "index": (".src", f"BAS(#BASE, 0)\nDECL POS P[2]\nP[1] = {kuka(0)}\nP[2] = {kuka(1)}\nLIN P[I]\n", 5),
+    "movec": (".script", f"movel({ur(0)})\nmovec({ur(1)}, {ur(2)})\n", 2),
+    "MoveC": (".mod", f"MoveL {abb(0)}, v50, fine, tool0;\nMoveC {abb(1)}, {abb(2)}, v50, fine, tool0;\n", 2),
+    "ArcCStart": (".mod", f"ArcCStart p1, {abb(2)}, v50, sm1, wd1, fine, tool0;\n", 1),
+}
+
+
+@pytest.mark.parametrize(("suffix", "text", "line"), WITHIN_PATHS.values(), ids=WITHIN_PATHS)
+def test_no_overshoot_is_inserted_into_an_arc_or_a_spline(suffix, text, line):
+    assert corrected(text, suffix).names
+    with pytest.raises(DataError, match=rf"line {line}: no overshoot point can stand before a move .*--approach"):
+        corrected(text, suffix, approach=1)
+
+
+def test_overshoots_stand_before_lines_beside_a_spline():
+    text = f"BAS(#BASE, 0)\nSPLINE\nSLIN XP9\nENDSPLINE\nLIN {kuka(0)} ; CIRC comes next\nCIRC XP7, XP8\n"
+    done = corrected(text, ".src", approach=1)
+    assert done.text.splitlines()[4].startswith("PTP {A1")
+    assert len(done.text.splitlines()) == len(text.splitlines()) + 1

@@ -1,0 +1,180 @@
+"""Bases and tools along the calls, branches and loops of a program: as the controller has them when it moves."""
+
+import pytest
+
+from calibrate.correct.programs import krl, rapid, urscript
+
+POINT = "LIN {X 1, Y 0, Z 0, A 0, B 0, C 0}\n"
+
+
+def base(metres: float) -> str:
+    return f"$BASE = {{X {1e3 * metres}, Y 0, Z 0, A 0, B 0, C 0}}\n"
+
+
+def of_krl(text: str) -> list[float | str]:
+    """Of each move in the order of the text: x of its base in metres, or why it is left as it is."""
+    return [
+        place.refused or (place.name if place.T is None else float(place.T[0, 3]))
+        for place in (one.used[0][0] for one in krl.find(text, 6).literals)
+    ]
+
+
+def test_moves_behind_a_call_have_the_base_that_the_called_routine_sets() -> None:
+    text = f"DEF main()\n{base(1)}{POINT}other()\n{POINT}nothing()\n{POINT}END\n"
+    text += f"DEF other()\n{POINT}{base(2)}{POINT}END\nDEF nothing()\n$OUT[1] = TRUE\nEND\n"
+    assert of_krl(text) == [1.0, 2.0, 2.0, 1.0, 2.0]
+
+
+def test_a_base_is_followed_through_calls_within_calls() -> None:
+    text = (
+        f"DEF main()\n{base(1)}outer()\n{POINT}END\nDEF outer()\n{POINT}inner()\n{POINT}END\nDEF inner()\n{base(3)}END"
+    )
+    assert of_krl(text) == [3.0, 1.0, 3.0]
+
+
+BRANCHES = {
+    "a branch": f"IF $IN[1] THEN\n{base(2)}ENDIF\n",
+    "one of two branches": f"IF $IN[1] THEN\n{base(2)}ELSE\n{base(3)}ENDIF\n",
+    "a case": f"SWITCH k\nCASE 1\n{base(2)}CASE 2\n{base(3)}ENDSWITCH\n",
+    "a loop": f"FOR k = 1 TO 2\n{base(2)}ENDFOR\n",
+    "an early return": f"IF $IN[1] THEN\nRETURN\nENDIF\n{base(2)}",
+    "a parameter": "$BASE = table\n",
+    "a parameter as number": "BAS(#BASE, n)\n",
+    "a number at run time": "$BASE = BASE_DATA[k]\n",
+    "itself": f"{base(2)}seam()\n",
+}
+
+
+@pytest.mark.parametrize("body", BRANCHES.values(), ids=BRANCHES)
+def test_a_base_that_is_not_plain_in_the_called_routine_is_named(body: str) -> None:
+    text = f"DEF main()\n{base(1)}seam(t, 2)\n{POINT}{base(4)}{POINT}END\nDEF seam(table:IN, n:IN)\n{body}END\n"
+    assert of_krl(text) == ["the base is set in the called routine seam", 4.0]
+
+
+def test_branches_that_agree_set_one_base() -> None:
+    text = f"DEF main()\n{base(1)}IF $IN[1] THEN\n{base(2)}{POINT}ELSE\n{base(2)}ENDIF\n{POINT}END\n"
+    assert of_krl(text) == [2.0, 2.0]
+    says = "the base is set in a branch or a loop above, or not"
+    assert of_krl(text.replace(f"ELSE\n{base(2)}", "")) == [2.0, says]
+
+
+def test_a_loop_is_entered_from_its_end_too() -> None:
+    says = "the base is set in a branch or a loop above, or not"
+    text = f"DEF main()\n{base(1)}LOOP\n{POINT}{base(2)}{POINT}ENDLOOP\nEND\n"
+    assert of_krl(text) == [says, 2.0]
+    assert of_krl(text.replace(f"LOOP\n{POINT}", f"LOOP\n{base(1)}{POINT}")) == [1.0, 2.0]
+
+
+def test_a_routine_that_an_interrupt_starts_has_no_known_base() -> None:
+    text = f"DEF main()\n{base(1)}INTERRUPT DECL 3 WHEN $IN[1] DO stop()\n{POINT}END\nDEF stop()\n{POINT}END\n"
+    assert of_krl(text) == [1.0, "the base is that of any moment at which stop may be started"]
+    text = text.replace("DEF stop()\n", f"DEF stop()\n{base(2)}")
+    assert of_krl(text) == ["the base is set in the called routine stop", 2.0]
+
+
+def test_a_frame_that_changes_or_is_computed_is_not_known() -> None:
+    frame = "{X 1000, Y 0, Z 0, A 0, B 0, C 0}"
+    assert of_krl(f"FRAME table = {frame}\n$BASE = table\n{POINT}") == [1.0]
+    assert of_krl(f"FRAME table = {frame}\ntable.X = 7\n$BASE = table\n{POINT}") == ["TABLE"]
+    assert of_krl(f"FRAME table = {frame} : shift\n$BASE = table\n{POINT}") == ["TABLE"]
+    assert "X1000" in str(of_krl(f"$BASE = {frame} : {frame}\n{POINT}")[0])
+
+
+def test_blocks_within_blocks_take_no_time() -> None:
+    deep = 40
+    text = f"LOOP\n{base(1)}{POINT}" * deep + f"{base(2)}ENDLOOP\n" * deep
+    assert of_krl(f"DEF main()\n{text}END\n") == [1.0] * deep
+
+
+def test_a_work_object_that_is_a_parameter_is_not_that_of_the_module() -> None:
+    pose = "[[0,0,0],[1,0,0,0]]"
+    text = (
+        f'PERS wobjdata table := [FALSE,TRUE,"",{pose},{pose}];\n'
+        f"PERS tooldata torch := [TRUE,{pose},[1,[0,0,1],[1,0,0,0],0,0,0]];\nPROC seam(PERS wobjdata table)\n"
+        "MoveL [[1,2,3],[1,0,0,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]], v50, fine, torch\\WObj:=table;\nENDPROC\n"
+    )
+    (frame,), (tool,) = rapid.find(text, 6).literals[0].used
+    assert frame.refused == "table is a parameter of its routine"
+    assert not tool.refused
+
+
+def tcp(metres: float) -> str:
+    return f"set_tcp(p[{metres}, 0, 0, 0, 0, 0])\n"
+
+
+def of_urscript(text: str) -> list[float | str]:
+    """Of each move in the order of the text: x of its tool in metres, or why it is left as it is."""
+    return [
+        place.refused or (place.name if place.T is None else float(place.T[0, 3]))
+        for place in (one.used[1][0] for one in urscript.find(text, 6).literals)
+    ]
+
+
+MOVEL = "movel(p[1, 2, 3, 0, 0, 0])\n"
+
+
+def test_a_function_has_the_tool_of_its_callers_not_the_one_above_it_in_the_text() -> None:
+    text = f"def weld():\n{tcp(1)}def seam():\n{MOVEL}end\n{tcp(2)}seam()\n{MOVEL}end\n"
+    assert of_urscript(text) == [2.0, 2.0]
+    twice = text.replace("seam()\nmovel", f"seam()\n{tcp(3)}seam()\nmovel")
+    assert of_urscript(twice) == ["the tool is not the same at all calls of its routine", 3.0]
+
+
+def test_moves_behind_a_call_have_the_tool_that_the_called_function_sets() -> None:
+    text = f"def weld():\ndef grip():\n{tcp(2)}end\n{tcp(1)}{MOVEL}grip()\n{MOVEL}end\n"
+    assert of_urscript(text) == [1.0, 2.0]
+    branch = text.replace(tcp(2), f"if digital_in(1):\n{tcp(2)}end\n")
+    assert of_urscript(branch) == [1.0, "the tool is set in the called routine grip"]
+    parameter = text.replace(f"grip():\n{tcp(2)}", "grip(tip):\nset_tcp(tip)\n")
+    assert of_urscript(parameter) == [1.0, "the tool is set in the called routine grip"]
+
+
+def test_a_function_that_nothing_in_the_file_calls_has_no_known_tool() -> None:
+    text = f"def weld():\n{tcp(1)}{MOVEL}end\ndef seam():\n{MOVEL}end\n"
+    assert of_urscript(text) == [1.0, "the caller"]
+    assert of_urscript(text.replace(tcp(1), "")) == ["", ""]
+
+
+def test_a_tool_that_is_set_in_the_main_loop_holds_behind_it_only_where_both_ways_agree() -> None:
+    text = f"def weld():\n{tcp(1)}while True:\n{MOVEL}if ready():\n{tcp(1)}else:\n{tcp(1)}end\nend\n{MOVEL}end\n"
+    assert of_urscript(text) == [1.0, 1.0]
+    says = "the tool is set in a branch or a loop above, or not"
+    assert of_urscript(text.replace(f"else:\n{tcp(1)}", f"else:\n{tcp(2)}")) == [says, says]
+
+
+def test_a_thread_may_set_the_tool_at_any_moment() -> None:
+    text = f"def weld():\nthread hand():\n{tcp(2)}end\n{tcp(1)}run hand()\n{MOVEL}end\n"
+    assert of_urscript(text) == ["the tool is set in the called routine hand"]
+
+
+POSE = "{X 1, Y 0, Z 0, A 0, B 0, C 0}"
+
+
+def test_a_base_of_one_move_is_that_of_this_move_only() -> None:
+    other, tool = "{X 2000, Y 0, Z 0, A 0, B 0, C 0}", "$TOOL = {X 0, Y 0, Z 7000, A 0, B 0, C 0}"
+    text = (
+        f"DECL E6POS XP1 = {POSE}\nDEF a()\n{base(1)}SLIN XP1 WITH $VEL.CP = 0.2, $BASE = {other}, {tool}\n{POINT}END\n"
+    )
+    first, second = krl.find(text, 6).literals
+    assert [float(pose.T[0, 3]) for pose in (first.used[0][0], second.used[0][0]) if pose.T is not None] == [2.0, 1.0]
+    assert [float(pose.T[2, 3]) for pose in first.used[1] if pose.T is not None] == [7.0]
+    assert second.used[1][0].name == ""
+    assert of_krl(text.replace(other, "jig")) == ["JIG", 1.0]
+    assert of_krl(text.replace(other, "jigs[k]")) == ["the pose of JIGS[K] is chosen while the program runs", 1.0]
+
+
+def test_the_form_of_a_move_with_the_frames_of_its_fdat() -> None:
+    text = (
+        "BASE_DATA[2] = {X 2000, Y 0, Z 0, A 0, B 0, C 0}\nTOOL_DATA[3] = {X 0, Y 0, Z 3000, A 0, B 0, C 0}\n"
+        f"DECL FDAT FP1 = {{TOOL_NO 3, BASE_NO 2}}\nDECL FDAT FP9 = {{TOOL_NO 0, BASE_NO 0}}\nDECL E6POS XP9 = {POSE}\n"
+        f"DEF a()\n{base(1)}SPTP XP9 WITH $VEL_AXIS[1]=SVEL_JOINT(9.0), $TOOL=STOOL2(FP1), $BASE=SBASE(FP1)\nEND\n"
+    )
+    (frame,), (tool,) = krl.find(text, 6).literals[0].used
+    assert frame.name == "BASE_DATA[2]"
+    assert tool.name == "TOOL_DATA[3]"
+
+
+def test_the_base_of_a_spline_block_ends_with_the_block() -> None:
+    header = base(2).replace("$BASE", "SPLINE WITH $BASE")
+    text = f"DEF a()\n{base(1)}{header}SLIN {POSE}\nENDSPLINE\n{POINT}END\n"
+    assert of_krl(text) == [2.0, 1.0]
