@@ -15,6 +15,7 @@ from calibrate.model_file import write_model
 from .six_joints import drawn, inverse, model, postures, real
 
 NUMBER = re.compile(r"-?\d+\.\d+")
+CONFIGURATION = re.compile(r"\[-?\d,-?\d,-?\d,0\],\[9E9")  # follows an axis that the correction takes over an edge
 Q = postures(8, seed=11)
 T = drawn().frames(Q)[:, -1]
 TOOL = np.eye(4)
@@ -142,13 +143,17 @@ def corrected(text, suffix, **options):
     return correct_program(model(), text, dialect_of(suffix), None, Q[0], {}, inverse(), options, "weld" + suffix)
 
 
+def masked(text):
+    return CONFIGURATION.sub("[cf],[9E9", NUMBER.sub("#", text))
+
+
 @pytest.mark.parametrize("suffix", PROGRAMS)
 def test_every_target_is_corrected_or_counted_and_nothing_else_changes(suffix):
     text, count, left, kept, _ = PROGRAMS[suffix]
     done = corrected(text, suffix)
     assert (len(done.names), len(done.skipped), len(done.kept)) == (count, left, kept), done.skipped
     assert np.isfinite(done.found.q_rad).all()
-    assert NUMBER.sub("#", done.text) == NUMBER.sub("#", text)
+    assert masked(done.text) == masked(text)
 
 
 @pytest.mark.parametrize("suffix", PROGRAMS)
