@@ -124,6 +124,12 @@ METHODS = {SolverName.LEVENBERG: Method.LEVENBERG, SolverName.DOGLEG: Method.DOG
 REDUNDANT = {RedundantName.REMOVED: Redundant.REMOVED, RedundantName.PRIORS: Redundant.HELD_BY_PRIORS}
 
 DEFAULT = FitPlan(schema=1)
+ZEROS_ONLY_COMMAND = "for the best offsets alone, lengths and axes nominal: calibeam identify REC --zeros-only"
+
+
+def zeros_only_text(discs: bool) -> str:
+    """The plan that holds all of the arm but its joint zeros; `discs`: the rig leaves those of the encoders open."""
+    return 'schema = 1\nhold = ["link*"' + (', "joint*.disc_*"' if discs else "") + "]\n"
 
 
 def read_plan(path: Path) -> tuple[FitPlan, str]:

@@ -33,6 +33,7 @@ def identify_command(
     recording: Path,
     *,
     plan: Path | None = None,
+    zeros_only: Annotated[bool, Parameter(negative=())] = False,
     model: Path | None = None,
     bootstrap: Annotated[int, Parameter(validator=validators.Number(gte=0))] | None = None,
     out: Path = Path("model.json"),
@@ -51,6 +52,7 @@ def identify_command(
 
     ```
     calibeam identify out/demo/recording.mcap --out model.json
+    calibeam identify out/demo/recording.mcap --zeros-only --out zeros.json
     calibeam identify now/recording.mcap --model last-year/model.json --out now/model.json
     ```
 
@@ -60,6 +62,9 @@ def identify_command(
         A recording, or a session folder with rig.toml and samples.csv.
     plan
         A fit plan (fit.toml): what is free, held or assumed, which instruments, loss, solver, proofs.
+    zeros_only
+        Only the joint zeros, beside base, target and fixture: offsets for a controller that takes nothing else. Lengths
+        and axes stay nominal. Not with --plan or --model.
     model
         A known model with physics: its structure, geometry and effects, is fitted to this recording, and nothing is
         searched. Not with --plan or --bootstrap.
@@ -76,13 +81,15 @@ def identify_command(
 
     """
     forms = tuple(form_named(name) for name in export)
+    if zeros_only and (plan is not None or model is not None):
+        raise DataError('give --zeros-only without --plan and --model; in a fit plan it is the line hold = ["link*"]')
     if model is not None:
         if plan is not None or bootstrap:
             raise DataError("--model refits a known structure; give it without --plan and --bootstrap")
         with naming_source(recording):
             status = _refit(Console(quiet=json), recording, read_model(model), out, forms)
     else:
-        planned = Planned.read(plan)
+        planned = None if zeros_only else Planned.read(plan)
         with naming_source(recording):
             status = _identify(Console(quiet=json), recording, planned, bootstrap, out, forms, verbose=verbose)
     if json:
@@ -93,7 +100,7 @@ def identify_command(
 def _identify(
     console: Console,
     recording: Path,
-    planned: Planned,
+    planned: Planned | None,  # None: zeros only
     bootstrap: int | None,
     out: Path,
     export: tuple[ExportForm, ...],
@@ -101,6 +108,7 @@ def _identify(
     verbose: bool,
 ) -> Status:
     source = read(recording)
+    planned = Planned.zeros_only(source.rig) if planned is None else planned
     result = identify_session(source, planned, bootstrap)
     refuse_undetermined(result.status, result.estimates)
     model = write_session_model(result, source, out, planned)

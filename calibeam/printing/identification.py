@@ -11,6 +11,7 @@ from rich.table import Table
 from calibeam.console import Console
 from calibrate.default_belief import said_of
 from calibrate.effects.term import Size, decimals_of, plain
+from calibrate.fit_plan import ZEROS_ONLY_COMMAND
 from calibrate.identification.estimates import ONLY_BELIEVED, JointZero
 from calibrate.identification.evidence_record import parameter_records
 from calibrate.identification.point_constraint import PointConstraints
@@ -167,7 +168,7 @@ def _brief(result: Identification) -> Iterator[str]:
         shown = ", ".join(missing[:NAMED]) + (f" and {len(missing) - NAMED} more" if len(missing) > NAMED else "")
         yield f"not determined: {shown} (why: --verbose)"
     if sum(map(_of_joint, missing)) > len(zeros) and any(name.startswith("link") for name, *_ in known):
-        yield 'joint zeros alone, links nominal: --plan FILE, a file with the lines schema = 1 and hold = ["link*"]'
+        yield ZEROS_ONLY_COMMAND
 
 
 NAMED = 4  # undetermined parameters

@@ -13,11 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.recording import Recording, readings_sha256
-from acquisition.recording.rig import rig_sha256
+from acquisition.recording.rig import Rig, rig_sha256
 from calibeam.outcome import PartialResult
 from calibrate.errors import DataError
 from calibrate.fit import Status
-from calibrate.fit_plan import DEFAULT, FitPlan, read_plan
+from calibrate.fit_plan import DEFAULT, FitPlan, parse_plan, read_plan, zeros_only_text
 from calibrate.identification.estimates import Estimate
 from calibrate.identification.identify import identify
 from calibrate.identification.record import record_of
@@ -71,6 +71,12 @@ class Planned:
     def read(cls, path: Path | None) -> "Planned":
         """The plan of a file, the defaults without one. DataError for what is wrong in it."""
         return cls() if path is None else cls(*read_plan(path))
+
+    @classmethod
+    def zeros_only(cls, rig: Rig) -> "Planned":
+        """Joint zeros, beside what base, target and fixture need; all else of the arm is held at the rig file."""
+        text = zeros_only_text(rig.tolerance is not None and rig.tolerance.eccentricity_rad is not None)
+        return cls(parse_plan(text, "--zeros-only"), text)
 
 
 def identify_session(

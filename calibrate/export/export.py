@@ -30,6 +30,7 @@ from calibrate.export.mjcf import mjcf_text
 from calibrate.export.nominal_table import nominal_table_text
 from calibrate.export.ur import ur_calibration_text, ur_kinematics_text
 from calibrate.export.urdf import urdf_text
+from calibrate.fit_plan import ZEROS_ONLY_COMMAND
 from calibrate.model_file import ModelFile, corrections
 from calibrate.physics.records import Effect
 from calibrate.plug_ins import EXPORTS, loaded
@@ -55,11 +56,8 @@ class ExportForm:
     uncoupled: str = ""  # why it cannot carry a joint that follows another one; "": it can
 
 
-NO_OFFSETS = (
-    "every offset is empty: beside free lengths and axes no zero is determined; for the zeros alone, identify with "
-    '--plan FILE, a file with the lines  schema = 1  and  hold = ["link*"]'
-)
-TOGETHER = "identified together with lengths and axes: for offsets alone, identify with a fit plan that holds those"
+NO_OFFSETS = f"every offset is empty: beside free lengths and axes no zero is determined; {ZEROS_ONLY_COMMAND}"
+TOGETHER = f"identified together with lengths and axes; {ZEROS_ONLY_COMMAND}"
 NO_UR = "no arm of Universal Robots has one; take another form, or correct the rig"
 GUESSED = "the rig file does not hold how its motors are coupled: offsets of motors would be guesses"
 FORMS: tuple[ExportForm, ...] = (
@@ -162,13 +160,12 @@ def export_model(path: Path, rig: Rig, model: ModelFile, form: ExportForm) -> tu
     soft = _linear_compliance(rig, model) if form.springs else {}
     says = _not_carried(model, tuple(soft)) if model.effects else ()
     if form.offsets:
-        says = (_geometry_lost(model), *says)
+        says = (*_beside_offsets(model), *says)
     compliance = {int(e.where.removeprefix("joint").split(".")[0]): c for e, c in soft.values()}
     arm = identified_arm(
         rig, corrections(model), model.about.get("tool"), says, model.parameters, compliance, model.covariance
     )
-    freed = any(p.name.startswith("link") and p.value is not None for p in model.parameters)
-    if form.offsets and freed:
+    if form.offsets and _with_links(model):
         says = (*says, NO_OFFSETS if all(refused(zero) for zero in arm.zeros) else TOGETHER)
         arm = replace(arm, not_carried=says)
     write_output(path, cleaned(form.text(arm)), export_output(form))
@@ -223,7 +220,13 @@ def _not_carried(model: ModelFile, carried: tuple[str, ...]) -> tuple[str, ...]:
     return not_carried(model, carried).sentences
 
 
-def _geometry_lost(model: ModelFile) -> str:
-    from calibrate.export.not_carried import geometry_lost
+def _with_links(model: ModelFile) -> bool:
+    """Whether lengths or axes were corrected, too."""
+    return any(name.startswith("link") and value != 0.0 for name, value in model.chain.items())
 
-    return geometry_lost(model)
+
+def _beside_offsets(model: ModelFile) -> tuple[str, ...]:
+    """What the nominal arm with the zeros of the model is off: from a whole model, or from the measured points."""
+    from calibrate.export.not_carried import geometry_lost, left_by_zeros
+
+    return (geometry_lost(model),) if model.effects or _with_links(model) else left_by_zeros(model)

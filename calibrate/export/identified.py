@@ -21,6 +21,8 @@ SIGN = (  # of an arm whose joints count from the link in front
     " below, nothing is to be added or subtracted"
 )
 
+NO_NUMBER = "not determined"
+
 
 @dataclass(frozen=True)
 class AxisOffset:
@@ -29,7 +31,7 @@ class AxisOffset:
     joint: int  # from 1
     value_rad: float
     sigma_rad: float | None  # None: not known
-    undetermined: bool
+    why: str  # not determined; "" where it is
 
 
 @dataclass(frozen=True)
@@ -116,11 +118,12 @@ def _zero(joint: int, own: Mapping[str, float], stated: Sequence[ModelParameter]
     """A zero of which the model has no number was held where it is, or is one choice among many."""
     name = f"joint{joint}.zero"
     if stated is None:
-        return AxisOffset(joint, own.get(name, 0.0), None, name not in own)
+        return AxisOffset(joint, own.get(name, 0.0), None, "" if name in own else NO_NUMBER)
     found = next((p for p in stated if p.name == name), None)
     if found is None or found.value is None:
-        return AxisOffset(joint, own.get(name, 0.0), None, True)
-    return AxisOffset(joint, found.value, found.sigma, False)
+        why = None if found is None else found.undetermined
+        return AxisOffset(joint, own.get(name, 0.0), None, why or NO_NUMBER)
+    return AxisOffset(joint, found.value, found.sigma, "")
 
 
 def _of_readings(rig: Rig, zeros: tuple[AxisOffset, ...], covariance: Covariance | None) -> tuple[AxisOffset, ...]:
@@ -137,7 +140,8 @@ def _of_readings(rig: Rig, zeros: tuple[AxisOffset, ...], covariance: Covariance
         of = [other for other, share in zip(zeros, back[i], strict=True) if share != 0.0]
         known = all(other.sigma_rad is not None for other in of)
         sigma = float(np.sqrt(variance[i])) if known else None
-        out.append(AxisOffset(zero.joint, float(value[i]), sigma, any(other.undetermined for other in of)))
+        why = next((other.why for other in of if other.why), "")
+        out.append(AxisOffset(zero.joint, float(value[i]), sigma, why))
     return tuple(out)
 
 

@@ -9,7 +9,8 @@ import math
 from collections.abc import Callable
 
 from calibrate.errors import DataError
-from calibrate.export.identified import AxisOffset, IdentifiedArm
+from calibrate.export.identified import NO_NUMBER, AxisOffset, IdentifiedArm
+from calibrate.export.nominal_table import quoted, to_sigma
 
 CLEAR = 2.0  # sigmas: an offset that is less than this is no better than none
 EXPLAINED = (
@@ -37,32 +38,31 @@ def abb_moc_text(arm: IdentifiedArm) -> str:
     missing = [i for i, ratio in ratios.items() if ratio is None]
     if missing:
         raise DataError(f"rig {arm.rig.name}: joint {missing[0]} has no gear_ratio; state it in [[arm.joint]]")
-    return _table(
-        arm, ABB, "rob1_", (("offset_deg", _degrees), ("motor_rad", lambda z: z.value_rad * (ratios[z.joint] or 1.0)))
-    )
+    return _table(arm, ABB, "rob1_", (("offset_deg", _degrees), ("motor_rad", lambda joint: ratios[joint] or 1.0)))
 
 
-def _table(
-    arm: IdentifiedArm, title: str, axis: str, columns: tuple[tuple[str, Callable[[AxisOffset], float]], ...]
-) -> str:
+def _table(arm: IdentifiedArm, title: str, axis: str, columns: tuple[tuple[str, Callable[[int], float]], ...]) -> str:
     lines = [f"# {says}" for says in (title, *EXPLAINED, *arm.not_carried)]
     lines.append(",".join(("axis", *(name for name, _ in columns), "sigma_deg", "not_entered_because")))
     for zero in arm.zeros:
-        why = refused(zero)
-        numbers = [repr(number(zero)) if not why else "" for _, number in columns]
-        sigma = "" if zero.sigma_rad is None else repr(math.degrees(zero.sigma_rad))
-        lines.append(",".join((f"{axis}{zero.joint}", *numbers, sigma, why)))
+        why, sigma = refused(zero), zero.sigma_rad
+        numbers = [
+            to_sigma(None if why else scale(zero.joint) * zero.value_rad, sigma and scale(zero.joint) * sigma)
+            for _, scale in columns
+        ]
+        sigma_deg = None if sigma is None else math.degrees(sigma)
+        lines.append(",".join((f"{axis}{zero.joint}", *numbers, to_sigma(sigma_deg, sigma_deg), quoted(why))))
     return "\n".join(lines) + "\n"
 
 
 def refused(zero: AxisOffset) -> str:
     """Why an offset is not to be entered; empty where it is."""
-    if zero.undetermined:
-        return "not determined by the recording"
+    if zero.why:
+        return zero.why if zero.why == NO_NUMBER else f"{NO_NUMBER}: {zero.why}"
     if zero.sigma_rad is not None and abs(zero.value_rad) < CLEAR * zero.sigma_rad:
         return f"less than {CLEAR:g} sigma"
     return ""
 
 
-def _degrees(zero: AxisOffset) -> float:
-    return math.degrees(zero.value_rad)
+def _degrees(_: int) -> float:
+    return math.degrees(1.0)

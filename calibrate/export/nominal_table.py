@@ -16,7 +16,8 @@ from scipy.spatial.transform import Rotation
 
 from acquisition.recording.rig import ArmModel, Joint, Make, Pose
 from calibrate.arms.coupled_readings import by_reading
-from calibrate.export.identified import IdentifiedArm
+from calibrate.effects.term import decimals_of
+from calibrate.export.identified import NO_NUMBER, IdentifiedArm
 
 ZERO = (0.0, 0.0, 0.0)
 AXIS = {Make.KUKA: "A"}  # what the makes call their axes; J elsewhere
@@ -54,10 +55,21 @@ def nominal_table_text(arm: IdentifiedArm) -> str:
         ",".join(HEADING),
     ]
     for row in nominal_table(arm):
-        numbers = ["" if v is None else repr(v) for v in (row.nominal, row.correction, row.sigma, row.calibrated)]
-        why = f'"{row.why.replace(chr(34), chr(39))}"' if "," in row.why else row.why
-        lines.append(",".join((row.parameter, row.unit, *numbers, why)))
+        numbers = (to_sigma(value, row.sigma) for value in (row.correction, row.sigma, row.calibrated))
+        lines.append(",".join((row.parameter, row.unit, repr(row.nominal), *numbers, quoted(row.why))))
     return "\n".join(lines) + "\n"
+
+
+def to_sigma(value: float | None, sigma: float | None) -> str:
+    """A cell: a value to the second digit of its sigma, in full where there is none; empty for no value."""
+    if value is None:
+        return ""
+    return f"{value:z.{decimals_of(sigma)}f}" if sigma else repr(value)
+
+
+def quoted(says: str) -> str:
+    """A cell of words."""
+    return f'"{says.replace(chr(34), chr(39))}"' if "," in says else says
 
 
 def _axes(arm: IdentifiedArm) -> Iterator[NominalRow]:
@@ -65,13 +77,10 @@ def _axes(arm: IdentifiedArm) -> Iterator[NominalRow]:
     matrix = by_reading(arm.rig.arm)
     if matrix is not None:
         drawn = np.linalg.solve(matrix, drawn)
-    reasons = {p.name: p.undetermined for p in arm.stated}
     letter = AXIS.get(arm.rig.arm.make, "J") if arm.rig.arm.make is not None else "J"
     for zero, nominal in zip(arm.zeros, drawn.tolist(), strict=True):
-        of = [zero.joint] if matrix is None else (1 + np.flatnonzero(matrix[zero.joint - 1])).tolist()
-        why = next((r for j in of if (r := reasons.get(f"joint{j}.zero"))), "") or "not determined"
-        value = None if zero.undetermined else zero.value_rad
-        yield _row(f"{letter}{zero.joint}", DEGREES, nominal, value, zero.sigma_rad, why)
+        value = None if zero.why else zero.value_rad
+        yield _row(f"{letter}{zero.joint}", DEGREES, nominal, value, zero.sigma_rad, zero.why)
 
 
 def _links(arm: IdentifiedArm) -> Iterator[NominalRow]:
@@ -79,7 +88,7 @@ def _links(arm: IdentifiedArm) -> Iterator[NominalRow]:
     for name, unit, nominal in _drawn(arm):
         if name in stated:
             found = stated[name]
-            yield _row(name, unit, nominal, found.value, found.sigma, found.undetermined or "not determined")
+            yield _row(name, unit, nominal, found.value, found.sigma, found.undetermined or NO_NUMBER)
 
 
 def _drawn(arm: IdentifiedArm) -> Iterator[tuple[str, tuple[float, str], float]]:

@@ -19,6 +19,8 @@ from calibrate.model_file import ModelFile
 from calibrate.physics.acting import Acting, arm_in, flange_frames
 from calibrate.physics.applied import effects_at, recorded_samples
 from calibrate.predict import Predictor
+from calibrate.report.quantities import angle, length
+from calibrate.sensors.catalogue import kind_of
 
 Floats = NDArray[np.float64]
 
@@ -131,6 +133,23 @@ def geometry_lost(model: ModelFile) -> str:
     )
 
 
+def left_by_zeros(model: ModelFile) -> tuple[str, ...]:
+    """What the nominal arm with the identified zeros misses the readings by, as the model of these zeros has it."""
+    says = {one: angle if kind_of(one).quantities[0].unit == "rad" else length for one in model.instruments}
+    first, of = says[model.instruments[0]], f" of {model.instruments[0]}" if len(says) > 1 else ""
+    return (
+        f"remaining error with these offsets, lengths and axes nominal: {first(model.rms_distance_after_m)} rms at the "
+        f"measured points{of} (nominal arm {first(model.rms_distance_before_m)})",
+        *(
+            f"remaining error on unseen rows ({p.split}){f', {p.instrument}' if len(says) > 1 else ''}: "
+            f"{says[p.instrument](p.rms_distance_after_m)} rms (nominal arm "
+            f"{says[p.instrument](p.rms_distance_before_m)})"
+            for p in model.proofs
+        ),
+        *(f"unseen rows: no proof ({why})" for why in model.unproven),
+    )
+
+
 def _left_over(tip_m: Floats, wanted_m: Floats) -> Floats:
     """(pose, 3) after the motion that brings the one best onto the other."""
     a, b = tip_m - tip_m.mean(axis=0), wanted_m - wanted_m.mean(axis=0)
@@ -143,10 +162,10 @@ def _drawn(recorded: Samples) -> Samples:
     like = rng.integers(len(recorded), size=POSES)
     columns = {name: values[like] for name, values in recorded.columns.items()}
     angles = rng.uniform(q.min(axis=0), q.max(axis=0), (POSES, q.shape[1]))
-    for j, angle in enumerate(angles.T, start=1):
+    for j, turned in enumerate(angles.T, start=1):
         if (command := f"cmd{j}_rad") in columns:
-            columns[command] += angle - columns[f"q{j}_rad"]
-        columns[f"q{j}_rad"] = angle
+            columns[command] += turned - columns[f"q{j}_rad"]
+        columns[f"q{j}_rad"] = turned
     return Samples(columns, recorded.n_joints)
 
 

@@ -99,10 +99,10 @@ def test_mastered_by_these_offsets_the_controller_reads_where_the_arm_stands(tmp
     """An arm as drawn at readings with the offsets added stands where the model has the arm at the readings."""
     text = TEXT.replace("by = 1.0", f"by = {by}")
     rig = parse_rig(text, "rig.toml")
-    export_model(tmp_path / "x", rig, known(rig, text), form_named("fanuc-mastering"))
+    export_model(tmp_path / "x", rig, known(rig, text, 1e-10), form_named("fanuc-mastering"))
     offsets = np.radians([float(row["offset_deg"]) for row in table_of(tmp_path / "x")])
-    np.testing.assert_allclose(flange(rig, {}, Q + offsets), flange(rig, ZEROS), atol=1e-12)
-    assert offsets[2] == pytest.approx(ZEROS["joint3.zero"] - by * ZEROS["joint2.zero"], abs=1e-15)
+    np.testing.assert_allclose(flange(rig, {}, Q + offsets), flange(rig, ZEROS), atol=1e-11)
+    assert offsets[2] == pytest.approx(ZEROS["joint3.zero"] - by * ZEROS["joint2.zero"], abs=1e-11)
     assert np.max(np.abs(flange(rig, {}, Q + list(ZEROS.values())) - flange(rig, ZEROS))) > 1e-4  # zeros alone do not
 
 
@@ -110,7 +110,7 @@ def test_mastered_by_these_offsets_the_controller_reads_where_the_arm_stands(tmp
 def test_sigma_of_a_coupled_offset_has_both_zeros_and_their_correlation(tmp_path, correlation, shares):
     export_model(tmp_path / "x", FANUC, known(FANUC, TEXT, 1e-4, correlation), form_named("fanuc-mastering"))
     sigma = np.radians([float(row["sigma_deg"]) for row in table_of(tmp_path / "x")])
-    assert sigma == pytest.approx([1e-4, 1e-4, shares * 1e-4, 1e-4, 1e-4, 1e-4])
+    assert sigma == pytest.approx([1e-4, 1e-4, shares * 1e-4, 1e-4, 1e-4, 1e-4], rel=0.02)  # two digits
 
 
 def test_an_offset_of_a_zero_that_is_not_determined_is_not_either(tmp_path):

@@ -107,7 +107,13 @@ def test_the_file_and_the_json_hold_the_same_rows(tmp_path):
     lines = (tmp_path / "model.table.csv").read_text(encoding="utf-8").splitlines()
     rows = list(csv.DictReader(line for line in lines if not line.startswith("#")))
     assert [row["parameter"] for row in rows] == [row["parameter"] for row in in_json]
+    assert {row["sigma"] for row in rows if row["unit"] == "deg"} == {"", "0.00057"}  # 10 µrad
     for row, same in zip(rows, in_json, strict=True):
         for name in ("nominal", "correction", "sigma", "calibrated"):
-            assert (None if row[name] == "" else float(row[name])) == same[name]
+            shown, behind = row[name], len(row[name].partition(".")[2])  # two digits of sigma; the JSON has them all
+            assert (
+                shown == ""
+                if same[name] is None
+                else float(shown) == pytest.approx(same[name], abs=0.51 * 10.0**-behind)
+            )
         assert row["not_determined_because"] == same["why"]
