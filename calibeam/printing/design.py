@@ -6,6 +6,7 @@ import numpy as np
 
 from acquisition.recording.rig import Rig
 from calibeam.console import Console
+from calibeam.printing.one_point import of_one_point
 from calibeam.printing.tables import plain_table
 from calibrate.diagnose.diagnosis import Named
 from calibrate.diagnose.smallest_visible import Smallest
@@ -48,6 +49,8 @@ def promise_lines(rig: Rig, made: Design) -> list[str]:
             "tolerances); "
             "it is not in these numbers"
         )
+    if left_open := of_one_point(rig):
+        out.append(left_open)
     return out
 
 

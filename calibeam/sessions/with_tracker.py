@@ -28,6 +28,7 @@ from calibeam.interrupts import INTERRUPTS
 from calibeam.live.feed import SILENT, Feed, Progress
 from calibeam.motion.reachable_poses import candidates_of, way_is_clear
 from calibeam.outcome import PartialResult
+from calibeam.printing.one_point import of_one_point
 from calibeam.printing.progress import progress_bar
 from calibeam.sessions.job import GO_ON, PLAN_NOTE, SEED_NOTE, plan_sha256
 from calibeam.sessions.keys import Keys
@@ -120,6 +121,8 @@ def run_tracked(job: TrackedJob, console: Console, feed: Feed = SILENT, *, askin
                 break
             taken = f", {before.samples} taken before" if before.samples else ""
             reporter.report(f"session with a tracker, readings: {before.left}, repeats among them{taken}")
+            if left_open := of_one_point(job.rig):
+                reporter.report(left_open)
             person.arm()
         try:
             _take(job, before, clock, console, feed, person)

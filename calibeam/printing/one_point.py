@@ -1,0 +1,19 @@
+"""What a session with one target leaves open, told before it is taken."""
+
+from acquisition.recording.rig import Rig
+
+SEVERAL = 3  # targets that show how the flange lies
+
+
+def of_one_point(rig: Rig) -> str:
+    """Empty where several targets show how the flange lies, or detectors or a probe stand in place of targets.
+
+    The size is that of docs/correct.md, measured by benchmarks/promised.py.
+    """
+    if rig.fixture is not None or rig.tool.probe_diameter_m is not None or len(rig.targets) >= SEVERAL:
+        return ""
+    return (
+        "one target shows where it is itself, not how the flange is turned: a tool 150 mm beside it is then known to some "
+        "0.5 mm; for other tools put three targets of measured places on the tool ([[target]] with point_sigma_m), or "
+        "teach them again after the correction"
+    )
