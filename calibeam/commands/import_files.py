@@ -5,7 +5,9 @@ import tempfile
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Annotated
 
+from cyclopts import Parameter, validators
 from rich.table import Table
 from rich.text import Text
 
@@ -53,6 +55,7 @@ def import_command(
     rig: Path | None = None,
     columns: str = "",
     sheet: str | None = None,
+    header_row: Annotated[int, Parameter(validator=validators.Number(gte=1))] | None = None,
     streams: bool = False,
     yes: bool = False,
 ) -> None:
@@ -88,6 +91,8 @@ def import_command(
         Of several logs "LOG: HEADINGS [unit] = meaning".
     sheet
         The sheet of a workbook with several tables.
+    header_row
+        The row of the headings, from 1, where what stands above them is taken for headings.
     streams
         A row of a table is a moment, not a pose: make a recording of streams.
     yes
@@ -99,7 +104,7 @@ def import_command(
     if source.is_dir() and not (source / BAG).is_file():
         if others:
             raise RecordingError(f"{others[0]}: a session folder is imported by itself; leave the others out")
-        given = {"rig": rig, "columns": columns, "sheet": sheet, "streams": streams}
+        given = {"rig": rig, "columns": columns, "sheet": sheet, "header_row": header_row, "streams": streams}
         _refuse(source, "a session folder has its own rig.toml", **given)
         with taken_back(out):
             import_folder(source, out, software=SOFTWARE)
@@ -112,15 +117,17 @@ def import_command(
     if rig is None:
         raise RecordingError(f"{source}: a table or a log names no rig; give --rig RIG.toml")
     if _is_can(source) and not others:
-        _refuse(source, "a CAN log has no columns", columns=columns, sheet=sheet, streams=streams)
+        _refuse(
+            source, "a CAN log has no columns", columns=columns, sheet=sheet, header_row=header_row, streams=streams
+        )
         _can(source, out, rig)
     elif streams or source.is_dir() or source.suffix.lower() in BAG_SUFFIXES:
-        sheets = [table for path in (source, *others) for table in _log_tables(path, sheet, rig, out)]
+        sheets = [table for path in (source, *others) for table in _log_tables(path, (sheet, header_row), rig, out)]
         _logs(understand_logs(sheets, rig_text(rig), str(rig), columns), out, yes=yes)
     elif others:
         raise RecordingError(f"{others[0]}: one table becomes one session; give --streams for several logs of one time")
     else:
-        _table(understand(read_sheet(source, sheet), rig_text(rig), str(rig), columns), out, yes=yes)
+        _table(understand(read_sheet(source, sheet, header_row), rig_text(rig), str(rig), columns), out, yes=yes)
 
 
 def _check_known(path: Path) -> None:
@@ -167,9 +174,10 @@ def _existing(out: Path) -> Path:
     return out.parent
 
 
-def _log_tables(path: Path, sheet: str | None, rig: Path, out: Path) -> tuple[Sheet, ...]:
+def _log_tables(path: Path, place: tuple[str | None, int | None], rig: Path, out: Path) -> tuple[Sheet, ...]:
+    """`place`: sheet and row of the headings."""
     if not _is_can(path):
-        return read_log(path, sheet if path.suffix.lower() in WORKBOOKS else None)
+        return read_log(path, place[0] if path.suffix.lower() in WORKBOOKS else None, place[1])
     encoders = load_rig(rig).devices.encoders
     if encoders is None or not described_by_dbc(encoders):
         raise RecordingError(
@@ -285,6 +293,6 @@ def _is_can_csv(source: Path) -> bool:
 
 
 def _refuse(source: Path, why: str, **given: object) -> None:
-    for name, value in given.items():
+    for name, value in ((name.replace("_", "-"), value) for name, value in given.items()):
         if value not in (None, "", False):
             raise RecordingError(f"{source}: --{name} {value}: {why}; leave --{name} out")

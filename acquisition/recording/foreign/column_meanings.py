@@ -109,12 +109,23 @@ PER_JOINT: Mapping[str, tuple[str, str]] = MappingProxyType(
 # folded headings of one column a joint, the number cut off
 _STEMS: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {
-        "q": ("q", "j", "a", "joint", "jt", "axis", "achse", "axe", "theta", "θ", "actualq", "jointpos"),
+        "q": (
+            *("q", "j", "a", "joint", "jt", "axis", "achse", "axe", "theta", "θ", "actualq", "jointpos", "jointangle"),
+            *("rax", "robax", "e6axisa", "axisa", "$axisacta", "axisacta"),
+        ),
         "cmd": ("cmd", "command", "qcmd", "targetq", "qtarget", "soll", "cmdq"),
         "enc": ("enc", "encoder"),
         "qd": ("qd", "actualqd", "jointvel"),
         "approach": ("approach",),
         "last_move": ("lastmove",),
+    }
+)
+# units of names that belong to one interface, by its manual: RTDE of Universal Robots, jointtarget of RAPID, E6AXIS of KRL
+_OF_INTERFACES: Mapping[str, str] = MappingProxyType(
+    {
+        **dict.fromkeys(("actualq", "targetq"), "rad"),
+        "actualqd": "rad/s",
+        **dict.fromkeys(("rax", "robax", "e6axisa", "$axisacta", "axisacta"), "deg"),
     }
 )
 # folded headings of what has a fixed number of columns; each tuple is one way to write it
@@ -203,15 +214,27 @@ class _Headings:
         whole = {stem: columns for stem, columns in found.items() if len(columns) == self._n}
         if len(whole) > 1:
             names = " or ".join(self._names(columns) for columns in whole.values())
-            raise SamplesError(f"{self._sheet.place()}: {meaning} may be {names}; {self._remedy(meaning)}")
+            differ = self._differ(*list(whole.values())[:2])
+            raise SamplesError(f"{self._sheet.place()}: {meaning} may be {names}{differ}; {self._remedy(meaning)}")
         if whole:
-            ((_, columns),) = whole.items()
-            yield self._taken(meaning, columns)
+            ((stem, columns),) = whole.items()
+            group = self._taken(meaning, columns)
+            yield group if group.unit else replace(group, unit=_OF_INTERFACES.get(stem, ""))
         elif meaning == "q" and (most := max(found.values(), key=len)):
             raise SamplesError(
                 f"{self._sheet.place()}: {len(most)} joint angles ({self._names(most)}) for an arm of {self._n} "
                 f"joints; correct the table, use another rig file, or {REMEDY}"
             )
+
+    def _differ(self, one: Sequence[int], other: Sequence[int]) -> str:
+        """Where two readings of the table part first."""
+        for row, cells in enumerate(self._sheet.rows):
+            for a, b in zip(one, other, strict=True):
+                if cells[a] != cells[b]:
+                    names = [shown(self._sheet.headings[c], 30) for c in (a, b)]
+                    values = [shown(str(cells[c]), 20) for c in (a, b)]
+                    return f" (row {self._sheet.lines[row]}: {names[0]} {values[0]}, {names[1]} {values[1]})"
+        return " (all their numbers are the same)"
 
     def _numbered(self, stem: str) -> tuple[int, ...]:
         """Columns stem1, stem2, ... or, as programmers count, stem0, stem1, ...; up to the first that is not there."""

@@ -28,7 +28,9 @@ _DEGREE = math.pi / 180.0
 _FACTORS: Mapping[str, Mapping[str, float]] = {
     "rad": {
         **{symbol: float(factor) for symbol, factor in UNITS["rad"].items()},
-        **dict.fromkeys(("deg", "°", "degree", "degrees", "degs"), _DEGREE),
+        # "Grad" is the German word for a degree; the 400th of a turn is "gon" there.
+        **dict.fromkeys(("deg", "°", "degree", "degrees", "degs", "Grad", "Grd"), _DEGREE),
+        "gon": math.tau / 400.0,
         "arcmin": _DEGREE / 60.0,
         "arcsec": _DEGREE / 3600.0,
         "turn": math.tau,

@@ -67,10 +67,10 @@ class LogStart:
     started_utc: datetime | None
 
 
-def read_log(path: Path, sheet: str | None = None) -> tuple[Sheet, ...]:
+def read_log(path: Path, sheet: str | None = None, header_row: int | None = None) -> tuple[Sheet, ...]:
     """The table of a file, or of each topic of a bag. SamplesError, RecordingError naming what cannot be read."""
     is_bag = path.is_dir() or path.suffix.lower() in BAG_SUFFIXES
-    return tuple(_bag(path)) if is_bag else (read_sheet(path, sheet),)
+    return tuple(_bag(path)) if is_bag else (read_sheet(path, sheet, header_row),)
 
 
 def understand_logs(sheets: Sequence[Sheet], rig_text: str, rig_name: str, columns: str) -> tuple[Understanding, ...]:

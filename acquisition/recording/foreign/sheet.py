@@ -1,6 +1,7 @@
 """A table of another program as it stands in its file: xlsx, CSV of any dialect, or Parquet; nothing is converted yet.
 
-The heading row is the first one with several texts and no number; rows above it are a title. A row of units may follow.
+The heading row is the one with the most texts and no number, just above the numbers; rows above it are a title. A row of
+units may follow.
 Decimals are a point or a comma, decided once for the whole file and refused where both occur.
 """
 
@@ -25,6 +26,7 @@ from acquisition.recording.foreign.heading_units import unit_of
 SUFFIXES = (".xlsx", ".xlsm", ".csv", ".tsv", ".txt", ".parquet")
 SEPARATORS = (";", "\t", ",")  # in this order: a table with decimal commas has them inside its cells
 TITLE_ROWS = 50  # above the headings, at most
+NAMED_AT_MOST = 12  # headings in an error
 LONGEST_HEADING = 200  # letters
 GRID_CELLS = 200_000_000  # with the empty ones: of 12,000 rows with something in the last column of a spreadsheet
 SHEETS = 100
@@ -51,6 +53,7 @@ class Sheet:
     rows: tuple[tuple[Raw, ...], ...]
     lines: tuple[int, ...]
     title: tuple[str, ...] = ()  # what stands above the headings
+    heading_line: int = 0  # in the file, from 1; 0: the file has names of columns apart from its rows
     decimal: str = "."  # or ",": of numbers that are text
 
     def place(self, row: int | None = None, column: int | None = None) -> str:
@@ -59,6 +62,13 @@ class Sheet:
         line = "" if row is None else f" row {self.lines[row]}"
         heading = "" if column is None else f", column '{shown(self.headings[column], 40)}'"
         return f"{self.path}{sheet}{line}{heading}"
+
+    @property
+    def told(self) -> str:
+        """The headings that are there, for a person."""
+        at = f"row {self.heading_line} has the headings" if self.heading_line else "the columns are"
+        some = [f"'{shown(h, 24)}'" for h in self.headings if h]
+        return f"{at} {', '.join(some[:NAMED_AT_MOST])}{' …' if len(some) > NAMED_AT_MOST else ''}"
 
     def cells(self, column: int) -> list[Raw]:
         """One column, from the first row on."""
@@ -118,8 +128,8 @@ class Sheet:
         return tuple(bool(cells) and all(map(number, cells)) for cells in filled)
 
 
-def read_sheet(path: Path, sheet: str | None = None) -> Sheet:
-    """The table of a file; `sheet` names one of a workbook with several.
+def read_sheet(path: Path, sheet: str | None = None, header_row: int | None = None) -> Sheet:
+    """The table of a file; `sheet` names one of a workbook with several, `header_row` the row of headings, from 1.
 
     SamplesError naming file and place where it cannot be read or holds no table.
     """
@@ -127,13 +137,17 @@ def read_sheet(path: Path, sheet: str | None = None) -> Sheet:
     if suffix not in SUFFIXES:
         raise SamplesError(f"{path}: no table that this program reads; save it as one of {', '.join(SUFFIXES)}")
     if suffix in (".xlsx", ".xlsm"):
-        return _workbook(path, sheet)
+        return _workbook(path, sheet, header_row)
     if sheet is not None:
         raise SamplesError(f"{path}: --sheet {shown(sheet, 40)}: only a workbook has sheets; leave it out")
-    return _parquet(path) if suffix == ".parquet" else _text(path)
+    if suffix != ".parquet":
+        return _text(path, header_row)
+    if header_row is not None:
+        raise SamplesError(f"{path}: --header-row {header_row}: Parquet names its columns itself; leave it out")
+    return _parquet(path)
 
 
-def _text(path: Path) -> Sheet:
+def _text(path: Path, header_row: int | None) -> Sheet:
     content = table_bytes(path, "table", SamplesError)
     if b"\0" in content[:4096] and not content.startswith((b"\xff\xfe", b"\xfe\xff")):
         raise SamplesError(f"{path}: not a text file; save the table as CSV or xlsx")
@@ -146,7 +160,7 @@ def _text(path: Path) -> Sheet:
             held.take(f"{path} line {reader.line_num}", reader.line_num, cells)
     except csv.Error as error:
         raise SamplesError(f"{path} line {reader.line_num}: not CSV: {error}; correct the line") from error
-    return _tabled(path, "", held.rows)
+    return _tabled(path, "", held.rows, header_row)
 
 
 class _Rows:
@@ -193,7 +207,7 @@ def _separator(text: str) -> str:
     return max(SEPARATORS, key=lambda mark: (sum(1 for n in counts[mark] if n), mark != ","))
 
 
-def _workbook(path: Path, wanted: str | None) -> Sheet:
+def _workbook(path: Path, wanted: str | None, header_row: int | None) -> Sheet:
     books = _openpyxl(path)
     _check_parts(path)
     try:
@@ -217,7 +231,7 @@ def _workbook(path: Path, wanted: str | None) -> Sheet:
     if not tables:
         raise SamplesError(f"{path}: no table in the workbook: no row of headings with numbers below; add headings")
     ((name, rows),) = tables.items()
-    return _without_formulas(_tabled(path, name, rows), books)
+    return _without_formulas(_tabled(path, name, rows, header_row), books)
 
 
 def _check_parts(path: Path) -> None:
@@ -285,10 +299,13 @@ def _parquet(path: Path) -> Sheet:
     return Sheet(path, "", tuple(table.column_names), tuple(units), rows, tuple(range(1, len(rows) + 1)))
 
 
-def _tabled(path: Path, name: str, rows: Sequence[tuple[int, Sequence[Raw]]]) -> Sheet:
+def _tabled(path: Path, name: str, rows: Sequence[tuple[int, Sequence[Raw]]], header_row: int | None) -> Sheet:
     """Headings, a row of units if there is one, and rows of as many cells; rows without any content are left out."""
-    at = _heading_row(rows)
     where = f"{path} sheet '{shown(name, 40)}'" if name else str(path)
+    if header_row is None:
+        at = _heading_row(rows)
+    elif (at := next((i for i, (line, _) in enumerate(rows) if line == header_row), None)) is None:
+        raise SamplesError(f"{where}: --header-row {header_row}: nothing stands there; give the row of the headings")
     if at is None:
         raise SamplesError(
             f"{where}: no row of headings with numbers below; write the columns' names above the numbers"
@@ -310,19 +327,25 @@ def _tabled(path: Path, name: str, rows: Sequence[tuple[int, Sequence[Raw]]]) ->
     table = tuple(cells for _, cells, _ in below)
     title = tuple(str(c) for _, cells in rows[:at] for c in cells if c is not None)
     lines = tuple(line for line, _, _ in below)
-    return Sheet(path, name, headings, tuple(units), table, lines, title, _decimal(where, lines, table))
+    return Sheet(path, name, headings, tuple(units), table, lines, title, rows[at][0], _decimal(where, lines, table))
 
 
 def _heading_row(rows: Sequence[tuple[int, Sequence[Raw]]]) -> int | None:
-    """The first row with at least two texts and no number, if numbers stand in one of the two rows below it."""
+    """Of rows with at least two texts and no number, in one of the two rows below which numbers stand, the one with the
+    most texts: titles have few. Of several the first, for units may stand below.
+    """
+    best: tuple[int, int] | None = None
     for at, (_, cells) in enumerate(rows[:TITLE_ROWS]):
         texts = [cell for cell in cells if isinstance(cell, str)]
         if len(texts) < 2 or any(map(_is_number, cells)) or _comma_numbers(cells):
             continue
         below = [c for _, c in rows[at + 1 :] if any(_filled(c))][:2]
         if any(sum(map(_is_number, c)) + _comma_numbers(c) >= 2 for c in below):
-            return at
-    return None
+            if best is None or len(texts) > best[0]:
+                best = len(texts), at
+        if best is not None and at - best[1] >= 2:
+            break
+    return None if best is None else best[1]
 
 
 def _is_unit_row(cells: Sequence[Raw]) -> bool:

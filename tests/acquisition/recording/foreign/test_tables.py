@@ -235,7 +235,7 @@ def refused(tmp_path, rig_source, headings, rows, columns="", name="lab.csv", **
         ("A{}", "{}", "deg", "mm", "no unit", "[deg] = q"),
         ("A{}", "{} [rad]", "deg", "mm", "in rad the values reach", "[deg] = q"),
         ("A{}", "{} [deg]", "rad", "mm", "in deg the values span", "[rad] = q"),
-        ("A{}", "{} [Grad]", "deg", "mm", "'Grad' is not known", "= q"),
+        ("A{}", "{} [Umdr]", "deg", "mm", "'Umdr' is not known", "= q"),
         ("A{}", "{} [mm]", "deg", "mm", "is no unit of q", "= q"),
     ],
 )
@@ -260,6 +260,55 @@ def test_open_units_of_positions_are_refused(tmp_path, rig_source, stated, lengt
     message = refused(tmp_path, rig_source, headings, table_of(session(), "deg", length))
     assert why in message
     assert "= position" in message
+
+
+@pytest.mark.parametrize(
+    ("names", "angle"),
+    [
+        ([f"rax_{i}" for i in range(1, 7)], "deg"),  # jointtarget of RAPID
+        ([f"robax{i}" for i in range(1, 7)], "deg"),
+        ([f"E6AXIS.A{i}" for i in range(1, 7)], "deg"),
+        ([f"$AXIS_ACT.A{i}" for i in range(1, 7)], "deg"),
+        ([f"actual_q_{i}" for i in range(6)], "rad"),  # RTDE
+        ([f"A{i} [Grad]" for i in range(1, 7)], "deg"),
+        ([f"Achse {i} [Grd]" for i in range(1, 7)], "deg"),
+    ],
+)
+def test_names_of_makers_are_known_with_their_units(tmp_path, rig_source, names, angle):
+    given = session(rows=20, seed=4)
+    path = write_csv(tmp_path / "lab.csv", [*names, "X [mm]", "Y [mm]", "Z [mm]"], table_of(given, angle, "mm"))
+    close(imported(path, rig_source)[1], given)
+
+
+def test_the_unit_of_a_makers_name_is_held_against_the_values(tmp_path, rig_source):
+    given = session(rows=20, seed=4)
+    headings = [*(f"rax_{i}" for i in range(1, 7)), "X [mm]", "Y [mm]", "Z [mm]"]
+    assert "[rad] = q" in refused(tmp_path, rig_source, headings, table_of(given, "rad", "mm"))
+
+
+@pytest.mark.parametrize("header_row", [None, 4])
+def test_titles_of_several_words_are_no_headings(tmp_path, rig_source, header_row):
+    given, path = session(rows=5, seed=2), tmp_path / "lab.csv"
+    write_csv(path, HEADINGS, table_of(given, "deg", "mm"), separator=";")
+    path.write_text("Firma GmbH;;;\nKalibrierung KR 6;12.11.2026;Halle 4;\n;;\n" + path.read_text())
+    table = understand(read_sheet(path, header_row=header_row), rig_source, "rig.toml", "")
+    close(samples_of(table), given)
+    assert "Firma GmbH" in table.sheet.title
+
+
+def test_a_row_of_headings_that_is_stated_is_taken(tmp_path, rig_source):
+    given, path = session(rows=5, seed=2), tmp_path / "lab.csv"
+    write_csv(path, HEADINGS, table_of(given, "deg", "mm"))
+    path.write_text(",".join(f"column {c}" for c in "abcdefghijk") + "\n" + path.read_text())
+    assert "column a" in refused_by(lambda: samples_of(understand(read_sheet(path), rig_source, "rig.toml", "")))
+    close(samples_of(understand(read_sheet(path, header_row=2), rig_source, "rig.toml", "")), given)
+    assert "--header-row 9" in refused_by(lambda: read_sheet(path, header_row=9))
+
+
+def refused_by(call):
+    with pytest.raises(SamplesError) as error:
+        call()
+    return str(error.value)
 
 
 def test_a_stated_unit_is_believed(tmp_path, rig_source):
