@@ -13,7 +13,7 @@ def of_one_point(rig: Rig) -> str:
     if rig.fixture is not None or rig.tool.probe_diameter_m is not None or len(rig.targets) >= SEVERAL:
         return ""
     return (
-        "one target shows where it is itself, not how the flange is turned: a tool 150 mm beside it is then known to some "
-        "0.5 mm; for other tools put three targets of measured places on the tool ([[target]] with point_sigma_m), or "
+        "one target shows where it is itself, not how the flange is turned: a tool 150 mm beside it is then known to "
+        "some 0.5 mm; for other tools put three targets of measured places on the tool ([[target]] with point_sigma_m), or "
         "teach them again after the correction"
     )

@@ -139,16 +139,15 @@ class _Errors:
 
     def applied(self, x: Floats) -> tuple[Floats, Floats]:
         """(pose, joint + 1, 4, 4) frames with errors (error,), and (pose, point, 3) of the points in the base."""
-        T = transform(x[:3], x[3:6]) @ self.drawn[:, 0]
-        out = [T]
+        out = [transform(x[:3], x[3:6]) @ self.drawn[:, 0]]
         for k, part in enumerate(x[6 : 6 + 7 * self.joints].reshape(-1, 7)):
             turned = transform(np.zeros(3), np.array([0.0, 0.0, part[0]]))
-            T = T @ turned @ inverse(self.drawn[:, k]) @ self.drawn[:, k + 1] @ transform(part[1:4], part[4:])
-            out.append(T)
+            link = inverse(self.drawn[:, k]) @ self.drawn[:, k + 1] @ transform(part[1:4], part[4:])
+            out.append(out[-1] @ turned @ link)
         off = x[6 + 7 * self.joints :]
         if self.sigma_m is not None:
-            return np.stack(out, axis=1), _at(T, self.points_m + off.reshape(-1, 3))
-        return np.stack(out, axis=1), _at(T @ transform(off[:3], off[3:]), self.points_m)
+            return np.stack(out, axis=1), _at(out[-1], self.points_m + off.reshape(-1, 3))
+        return np.stack(out, axis=1), _at(out[-1] @ transform(off[:3], off[3:]), self.points_m)
 
     def columns(self, frames: Floats, at_m: Floats) -> Floats:
         """(pose x point x 3, error) how the points move in the base."""

@@ -36,7 +36,7 @@ class Split:
 def same_poses(q_rad: Floats) -> Rows:
     """(row,) number from 0 of the pose of each row of joints (row, joint), in the order in which they first come."""
     out, poses = np.full(len(q_rad), -1, dtype=np.intp), 0
-    known = np.isfinite(q_rad).all(axis=1)
+    known = np.all(np.isfinite(q_rad), axis=1)
     at, tree = np.flatnonzero(known), KDTree(q_rad[known])
     for row in range(len(q_rad)):
         if out[row] < 0:

@@ -120,7 +120,7 @@ _STEMS: Mapping[str, tuple[str, ...]] = MappingProxyType(
         "last_move": ("lastmove",),
     }
 )
-# units of names that belong to one interface, by its manual: RTDE of Universal Robots, jointtarget of RAPID, E6AXIS of KRL
+# units of names that belong to one interface, by its manual: RTDE (Universal Robots), jointtarget (RAPID), E6AXIS (KRL)
 _OF_INTERFACES: Mapping[str, str] = MappingProxyType(
     {
         **dict.fromkeys(("actualq", "targetq"), "rad"),

@@ -193,8 +193,8 @@ def samples_of(table: Understanding) -> Samples:
     missing = [name for name in per_joint("q", "_rad", n_joints) if name not in columns]
     if missing:
         raise SamplesError(
-            f"{sheet.place()}: no columns are understood as the {n_joints} joint angles ({sheet.told}); state which they "
-            f'are: --columns "A1..A{n_joints} [deg] = q", or the row of the headings: --header-row'
+            f"{sheet.place()}: no columns are understood as the {n_joints} joint angles ({sheet.told}); state which "
+            f'they are: --columns "A1..A{n_joints} [deg] = q", or the row of the headings: --header-row'
         )
     if len(columns) == n_joints + 1:
         raise SamplesError(

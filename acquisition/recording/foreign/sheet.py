@@ -1,7 +1,7 @@
 """A table of another program as it stands in its file: xlsx, CSV of any dialect, or Parquet; nothing is converted yet.
 
-The heading row is the one with the most texts and no number, just above the numbers; rows above it are a title. A row of
-units may follow.
+The heading row is the one with the most texts and no number, just above the numbers; rows above it are a title. A row
+of units may follow.
 Decimals are a point or a comma, decided once for the whole file and refused where both occur.
 """
 
@@ -340,11 +340,9 @@ def _heading_row(rows: Sequence[tuple[int, Sequence[Raw]]]) -> int | None:
         if len(texts) < 2 or any(map(_is_number, cells)) or _comma_numbers(cells):
             continue
         below = [c for _, c in rows[at + 1 :] if any(_filled(c))][:2]
-        if any(sum(map(_is_number, c)) + _comma_numbers(c) >= 2 for c in below):
-            if best is None or len(texts) > best[0]:
-                best = len(texts), at
-        if best is not None and at - best[1] >= 2:
-            break
+        numbers = any(sum(map(_is_number, c)) + _comma_numbers(c) >= 2 for c in below)
+        if numbers and (best is None or len(texts) > best[0]):
+            best = len(texts), at
     return None if best is None else best[1]
 
 
