@@ -14,6 +14,6 @@ def of_one_point(rig: Rig) -> str:
         return ""
     return (
         "one target shows where it is itself, not how the flange is turned: a tool 150 mm beside it is then known to "
-        "some 0.5 mm; for other tools put three targets of measured places on the tool ([[target]] with point_sigma_m), or "
-        "teach them again after the correction"
+        "some 0.5 mm; for other tools put three targets of measured places on the tool ([[target]] with point_sigma_m), "
+        "or teach them again after the correction"
     )
