@@ -18,7 +18,15 @@ from calibrate.parameters import Parameter, plausible_sizes, priors
 from calibrate.sensors.catalogue import FRAMES
 from calibrate.solvers.linear import triangle_of
 
-__all__ = ["WEAK", "Combination", "Identifiability", "analyse", "in_words"]
+__all__ = [
+    "STRUCTURAL",
+    "WEAK",
+    "Combination",
+    "Identifiability",
+    "analyse",
+    "combinations_of",
+    "in_words",
+]
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -106,7 +114,7 @@ def analyse(jacobian: Floats, parameters: tuple[Parameter, ...]) -> Identifiabil
         int(seen.sum()),
         s,
         float(s[0] / s[seen][-1]) if seen.any() else float("inf"),
-        _combinations(unseen[:, ::-1], names, n_structural, invisible),
+        combinations_of(unseen[:, ::-1], names, n_structural, invisible),
         sigma,
         scale[:, None] * unseen,
     )
@@ -126,7 +134,7 @@ def directions(jacobian: Floats, belief: Floats) -> tuple[Floats, Floats]:
     return s, Vt
 
 
-def _combinations(
+def combinations_of(
     unseen: Floats, names: tuple[str, ...], n_structural: int, invisible: Bools
 ) -> tuple[Combination, ...]:
     """Simplest basis of the unseen directions (weakest first): each has a representative that no other contains.

@@ -27,6 +27,7 @@ def rig_command(
     from_urdf: str | None = None,
     from_mjcf: str | None = None,
     from_dh: Path | None = None,
+    from_ur_kinematics: Path | None = None,
     base_link: str | None = None,
     tip_link: str | None = None,
     out: Path = Path("rig.toml"),
@@ -54,6 +55,8 @@ def rig_command(
         A MuJoCo model, or a name of robot_descriptions.
     from_dh
         A D-H table as CSV: `standard; a [mm]; alpha [deg]; d [mm]; theta [deg]`, or `modified; ...`.
+    from_ur_kinematics
+        The YAML that calibration_correction of ur_calibration writes: the factory calibration of one UR.
     base_link
         Where the arm begins: a link of the URDF, a body of the MJCF; without it, where the file begins.
     tip_link
@@ -66,15 +69,19 @@ def rig_command(
         for name in shipped_rigs():
             print(f"{name:24} {first_comment(shipped_text(name))}")
         return
-    given = [one for one in (from_name, from_urdf, from_mjcf, from_dh) if one is not None]
+    given = [one for one in (from_name, from_urdf, from_mjcf, from_dh, from_ur_kinematics) if one is not None]
     if len(given) != 1:
-        raise DataError("rig new: give one of --from, --from-urdf, --from-mjcf, --from-dh")
+        raise DataError("rig new: give one of --from, --from-urdf, --from-mjcf, --from-dh, --from-ur-kinematics")
     if out.exists():
         raise DataError(f"{out} is there already and is not written over; choose another --out")
     if from_name is not None:
         text = shipped_text(from_name)
     elif from_dh is not None:
         text = dh_table_text(from_dh, from_dh.stem)
+    elif from_ur_kinematics is not None:
+        from calibeam.new_rig.from_urdf import ur_kinematics_rig
+
+        text = ur_kinematics_rig(from_ur_kinematics)
     else:
         text = _of_model(from_urdf, from_mjcf, base_link, tip_link)
     rig = parse_rig(text, str(out))

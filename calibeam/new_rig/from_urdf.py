@@ -2,9 +2,14 @@
 
 Source of the form: ROS wiki, urdf/XML/joint and urdf/XML/link: origin first (xyz in m, rpy in rad about fixed axes),
 then the turn about `axis`, in the joint's own frame. Read with ElementTree; a document type or an entity is refused.
+
+The kinematics YAML of a UR holds the origins of the six joints of its URDF, as the factory calibrated that one robot.
+Source: ur_calibration, calibration_correction, and ur_macro.xacro (UniversalRobots, Universal_Robots_ROS2_Driver and
+..._Description): each joint turns about its z; the first origin is in base_link_inertia, the controller's base.
 """
 
 import math
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,8 +21,9 @@ from scipy.spatial.transform import Rotation
 
 from acquisition.recording.files import read_text, shown
 from acquisition.recording.files.bounds import FEW
-from calibeam.new_rig.drawn import ANY_TURN_RAD, DrawnArm, DrawnJoint, onto_axis
+from calibeam.new_rig.drawn import ANY_TURN_RAD, DrawnArm, DrawnJoint, onto_axis, poe_text
 from calibrate.errors import DataError
+from calibrate.export.ur import BODIES
 from calibrate.rigid import inverse
 
 Floats = NDArray[np.float64]
@@ -25,6 +31,7 @@ Floats = NDArray[np.float64]
 TURNING = ("revolute", "continuous")
 FLANGES = ("tool0", "flange", "ee_link", "tool_link", "link_ee")  # usual names, where a robot ends in several links
 SHORTEST_AXIS = 1e-6
+FLANGE = "calibeam_flange"  # of our own export, beside the bodies of UR
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,6 +74,34 @@ def urdf_arm(path: Path, base_link: str | None = None, tip_link: str | None = No
     if free:
         notes.append(f"Continuous joints have no limits there, taken as one turn either way: {', '.join(free)}.")
     return _arm(root.get("name") or path.stem, chain, joints, links, tuple(notes))
+
+
+def ur_kinematics_rig(path: Path) -> str:
+    """The rig file of the UR that a kinematics YAML describes. DataError naming file, body, key and remedy."""
+    text, body = read_text(path, "UR kinematics", DataError), ""
+    found, says = dict[str, dict[str, str]](), ""
+    for line in re.split(r"[\n{},]", re.sub("#.*", "", text)):  # blocks, or braces
+        key, _, value = (word.strip() for word in line.partition(":"))
+        says = value if key == "hash" else says
+        body = body if value or not key else key
+        found.setdefault(body, {})[key] = value
+    parts = [_ur_part(path, name, found) for name in BODIES]
+    flange = _ur_part(path, FLANGE, found) if FLANGE in found else np.eye(4)
+    turns = [ANY_TURN_RAD, ANY_TURN_RAD, math.pi, *(ANY_TURN_RAD,) * 3]  # joint_limits.yaml: the elbow half a turn
+    notes = f"From {path.name}: a UR as its factory calibrated it ({says or 'no hash'}).\nThe file has no masses."
+    joints = tuple(DrawnJoint(T, -turn, turn) for T, turn in zip(parts, turns, strict=True))
+    return poe_text(DrawnArm(path.stem, joints, flange, (notes,))).replace("[arm]\n", '[arm]\nmake = "ur"\n', 1)
+
+
+def _ur_part(path: Path, body: str, found: Mapping[str, Mapping[str, str]]) -> Floats:
+    keys = ("x", "y", "z", "roll", "pitch", "yaw")
+    if missing := [key for key in keys if key not in found.get(body, {})]:
+        raise DataError(
+            f"{path}: {body}: {missing[0]} is missing; give the whole file that calibration_correction of "
+            "ur_calibration writes: kinematics, six bodies with x, y, z, roll, pitch, yaw"
+        )
+    values = _numbers(f"{path}: {body}", " ".join(found[body][key] for key in keys), len(keys))
+    return _turned(values[:3], values[3:])
 
 
 def xml_root(path: Path, what: str) -> ElementTree.Element:
@@ -147,11 +182,16 @@ def _range(where: str, element: ElementTree.Element, kind: str) -> tuple[float, 
 
 def _origin(where: str, element: ElementTree.Element) -> Floats:
     """(4, 4) of the element's <origin>."""
-    out, origin = np.eye(4), element.find("origin")
+    origin = element.find("origin")
     if origin is None:
-        return out
-    out[:3, 3] = _numbers(where, origin.get("xyz", "0 0 0"), 3)
-    out[:3, :3] = Rotation.from_euler("xyz", _numbers(where, origin.get("rpy", "0 0 0"), 3)).as_matrix()
+        return np.eye(4)
+    return _turned(*(_numbers(where, origin.get(key, "0 0 0"), 3) for key in ("xyz", "rpy")))
+
+
+def _turned(origin_m: Floats, rpy_rad: Floats) -> Floats:
+    """(4, 4) of an origin and angles about fixed axes."""
+    out = np.eye(4)
+    out[:3, 3], out[:3, :3] = origin_m, Rotation.from_euler("xyz", rpy_rad).as_matrix()
     return out
 
 

@@ -11,6 +11,7 @@ from rich.table import Table
 from calibeam.console import Console
 from calibrate.default_belief import said_of
 from calibrate.effects.term import Size, decimals_of, plain
+from calibrate.export.nominal_table import cells, nominal_table
 from calibrate.fit_plan import ZEROS_ONLY_COMMAND
 from calibrate.identification.estimates import ONLY_BELIEVED, JointZero
 from calibrate.identification.evidence_record import parameter_records
@@ -20,7 +21,7 @@ from calibrate.model_file import ModelFile, ModelParameter
 from calibrate.observability import Observability
 from calibrate.physics.records import Effect
 from calibrate.report.model_tests import fit_end
-from calibrate.report.quantities import angle, counted, length
+from calibrate.report.quantities import angle, counted, length, significant
 from calibrate.report.session_evidence import SessionEvidence
 from calibrate.report.session_verdict import session_verdict
 from calibrate.report.verdict import TOOL, Answers, Number, Trust, Verdict
@@ -133,6 +134,7 @@ def print_identification(
         console.print(assumed, highlight=False, markup=False)
     if verbose:
         _print_details(console, result, of_spots=of_spots)
+        _print_arm(console, evidence)
         if (end := fit_end(evidence.model)) is not None:
             says = f"fit by {end[0]}: {counted(end[1], 'iteration')} in all rounds, ended by {end[2]}"
             console.print(says, highlight=False, markup=False)
@@ -223,6 +225,19 @@ def _print_parameters(console: Console, parameters: tuple[ModelParameter, ...]) 
         _print_table(console, ("bootstrap sigma", "bootstrap 95 %"), drawn, _by_bootstrap)
 
 
+def _print_arm(console: Console, evidence: SessionEvidence) -> None:
+    """Nominal, correction, calibrated of every joint and link number."""
+    table = Table(title="D-H table: nominal, correction, calibrated", title_justify="left")
+    for heading in ("number", "nominal", "correction", "sigma", "calibrated"):
+        table.add_column(heading, justify="right")
+    shown = [cells(row) for row in nominal_table(evidence.calibrated_arm)]
+    for row in shown:
+        table.add_row(*(row if len(row) == len(table.columns) else (*row[:2], "-", "-", "-")))
+    console.print(table)
+    for name, _, *why in (row for row in shown if len(row) < len(table.columns)):
+        console.print(f"  {name.partition(' ')[0]} {why[0]}", highlight=False, markup=False)
+
+
 def _print_zeros(console: Console, zeros: tuple[JointZero, ...]) -> None:
     """Of a session with spots, which is made for them; true angle = reading + zero."""
     table = Table()
@@ -232,9 +247,10 @@ def _print_zeros(console: Console, zeros: tuple[JointZero, ...]) -> None:
         if zero.value_rad is None or zero.sigma_rad is None:
             table.add_row(f"J{zero.joint}", "not determined", "-", "-", "-")
             continue
-        alone = "-" if zero.measurement_sigma_rad is None else f"{1e6 * zero.measurement_sigma_rad:.1f}"
-        degrees, sigma = f"{np.degrees(zero.value_rad):+z.5f}", f"{np.degrees(zero.sigma_rad):.5f}"
-        table.add_row(f"J{zero.joint}", degrees, sigma, f"{1e6 * zero.sigma_rad:.1f}", alone)
+        alone = "-" if zero.measurement_sigma_rad is None else significant(1e6 * zero.measurement_sigma_rad, 2)
+        decimals = decimals_of(np.degrees(zero.sigma_rad))
+        degrees, sigma = (f"{np.degrees(v):z.{decimals}f}" for v in (zero.value_rad, zero.sigma_rad))
+        table.add_row(f"J{zero.joint}", degrees, sigma, significant(1e6 * zero.sigma_rad, 2), alone)
     console.print(table)
     for zero in zeros:
         if zero.value_rad is None:
@@ -271,20 +287,26 @@ def _print_table(
 
 
 def _by_covariance(p: ModelParameter, factor: float) -> list[str]:
-    promised = _cell(p.predicted_sigma, factor)
-    return [_cell(p.value, factor, "+"), _cell(p.sigma, factor), promised, _interval(p.low, p.high, factor)]
+    return [
+        _cell(p.value, factor, p.sigma, "+"),
+        _cell(p.sigma, factor, p.sigma),
+        _cell(p.predicted_sigma, factor, p.predicted_sigma),
+        _interval(p.low, p.high, factor, p.sigma),
+    ]
 
 
 def _by_bootstrap(p: ModelParameter, factor: float) -> list[str]:
-    return [_cell(p.bootstrap_sigma, factor), _interval(p.bootstrap_low, p.bootstrap_high, factor)]
+    sigma = p.bootstrap_sigma
+    return [_cell(sigma, factor, sigma), _interval(p.bootstrap_low, p.bootstrap_high, factor, sigma)]
 
 
-def _interval(low: float | None, high: float | None, factor: float) -> str:
-    return f"{_cell(low, factor, '+')} {_cell(high, factor, '+')}"
+def _interval(low: float | None, high: float | None, factor: float, sigma: float | None) -> str:
+    return f"{_cell(low, factor, sigma, '+')} {_cell(high, factor, sigma, '+')}"
 
 
-def _cell(value: float | None, factor: float, sign: str = "") -> str:
-    return "-" if value is None else f"{factor * value:{sign}.4g}"
+def _cell(value: float | None, factor: float, sigma: float | None, sign: str = "") -> str:
+    """To the second digit of its sigma."""
+    return "-" if value is None else f"{factor * value:{sign}z.{decimals_of(factor * (sigma or 0.0))}f}"
 
 
 def _figures(result: Identification) -> list[str]:

@@ -54,12 +54,17 @@ def convert(
     corrections: Mapping[str, float] | None = None,
     near_parallel: NearParallel = NearParallel.TILT,
 ) -> Conversion:
-    """The arm as corrected in another model. KeyError for a correction that the arm does not have."""
+    """The arm as corrected in another model. KeyError for a correction that the arm does not have.
+
+    The first frame and the senses of common normals of a corrected arm are those of the nominal one, so that the
+    numbers of both compare.
+    """
     parts = corrected_parts(arm, corrections or {})
     if model is ArmModel.LOCAL_POE:
         new, tilts, T_base_new = _local_poe(arm, parts), dict[str, float](), np.eye(4)
     else:
-        table = dh_table(_offsets_behind(arm, corrections or {}, parts), near_parallel)
+        like = dh_table(_offsets_behind(arm, {}, corrected_parts(arm, {})), near_parallel) if corrections else None
+        table = dh_table(_offsets_behind(arm, corrections or {}, parts), near_parallel, like)
         new = _standard(arm, table) if model is ArmModel.DH else _modified(arm, table)
         tilts = {f"link{i}.tilt": t for i, t in enumerate(table.tilt_rad, start=1) if t != 0.0}
         T_base_new = table.T_base_first

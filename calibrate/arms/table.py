@@ -44,44 +44,50 @@ class Table:
     T_last_flange: Floats
 
 
-def dh_table(parts: Floats, near_parallel: NearParallel = NearParallel.TILT) -> Table:
-    """The D-H table of the arm F_0 Rz(q_1) F_1 ... Rz(q_n) F_n, parts (joint + 1, 4, 4); offsets are in the parts."""
+def dh_table(parts: Floats, near_parallel: NearParallel = NearParallel.TILT, like: Table | None = None) -> Table:
+    """The D-H table of the arm F_0 Rz(q_1) F_1 ... Rz(q_n) F_n, parts (joint + 1, 4, 4); offsets are in the parts.
+
+    `like`: the table of a near arm; the first frame is turned as there, and of the two
+    senses of a common normal that of this table is taken.
+    """
     n = len(parts) - 1
-    own = _slid_towards_base(parts[0])  # own frame of axis i, given in B_(i-1): a slide along and turn about z
+    near = (0.0,) * n if like is None else [row.theta_offset_rad for row in like.rows]
+    first = np.eye(3) if like is None else like.T_base_first[:3, :3]
+    own = _slid_towards(first, parts[0])  # own frame of axis i, given in B_(i-1): a slide along and turn about z
     T_base_first = parts[0] @ own
     rows: list[DhLink] = []
     tilts: list[float] = []
     for i in range(1, n + 1):
         T_own_next = inverse(own) @ parts[i]
-        row, tilt = _row(T_own_next, near_parallel) if i < n else (_last_row(T_own_next), 0.0)
+        row, tilt = _row(T_own_next, near_parallel, near[i - 1]) if i < n else (_last_row(T_own_next), 0.0)
         rows.append(row)
         tilts.append(0.0 if near_parallel is NearParallel.AS_PARALLEL else tilt)
         own = inverse(parts[i]) @ own @ _tail(row, tilt)
     return Table(T_base_first, tuple(rows), tuple(tilts), inverse(own))
 
 
-def _slid_towards_base(T_base_axis: Floats) -> Floats:
-    """Slide and turn that bring a frame on axis 1 as near to the base frame as they can."""
-    R, origin_m = T_base_axis[:3, :3], T_base_axis[:3, 3]
+def _slid_towards(R_base_first: Floats, T_base_axis: Floats) -> Floats:
+    """Slide and turn that bring a frame on axis 1 as near to the base origin and this orientation as they can."""
+    R = R_base_first.T @ T_base_axis[:3, :3]
     turn = math.atan2(R[0, 1] - R[1, 0], R[0, 0] + R[1, 1])  # largest trace of R Rz(turn)
-    slid = -float(R[:, 2] @ origin_m)  # to the foot of the base origin on the axis
+    slid = -float(T_base_axis[:3, 2] @ T_base_axis[:3, 3])  # to the foot of the base origin on the axis
     return shift(0.0, slid) @ rotation_z(turn)
 
 
-def _row(T_own_next: Floats, near_parallel: NearParallel) -> tuple[DhLink, float]:
+def _row(T_own_next: Floats, near_parallel: NearParallel, near: float) -> tuple[DhLink, float]:
     """Row and tilt that lead from z of a frame to the axis z of another one given in it."""
     point_m, axis = T_own_next[:3, 3], T_own_next[:3, 2]
     sine = math.hypot(axis[0], axis[1])
     if sine > (PARALLEL_SINE if near_parallel is NearParallel.COMMON_NORMAL else NEAR_PARALLEL_SINE):
-        return _by_common_normal(point_m, axis), 0.0
-    row, tilt = _by_normal_plane(point_m, axis)
+        return _by_common_normal(point_m, axis, near), 0.0
+    row, tilt = _by_normal_plane(point_m, axis, near)
     return row, 0.0 if near_parallel is NearParallel.COMMON_NORMAL else tilt
 
 
-def _by_common_normal(point_m: Floats, axis: Floats) -> DhLink:
+def _by_common_normal(point_m: Floats, axis: Floats, near: float) -> DhLink:
     """The axis z and a line that is not parallel to it."""
     normal = np.array([-axis[1], axis[0]]) / math.hypot(axis[0], axis[1])  # of z x axis; its third part is zero
-    theta = _nearer_half(math.atan2(normal[1], normal[0]))
+    theta = _nearer_half(math.atan2(normal[1], normal[0]), near)
     c, s = math.cos(theta), math.sin(theta)
     across = -s * axis[0] + c * axis[1]  # part of the axis along y, once x is the normal
     along = (-s * point_m[0] + c * point_m[1]) / across  # from the point back to the foot, in units of the axis
@@ -89,10 +95,10 @@ def _by_common_normal(point_m: Floats, axis: Floats) -> DhLink:
     return DhLink(theta, d, float(c * point_m[0] + s * point_m[1]), math.atan2(-across, axis[2]))
 
 
-def _by_normal_plane(point_m: Floats, axis: Floats) -> tuple[DhLink, float]:
+def _by_normal_plane(point_m: Floats, axis: Floats, near: float) -> tuple[DhLink, float]:
     """The axis z and a line near-parallel to it that passes the plane normal to z at the given point."""
     length = math.hypot(point_m[0], point_m[1])
-    theta = _nearer_half(math.atan2(point_m[1], point_m[0])) if length > ON_THE_AXIS_M else 0.0
+    theta = _nearer_half(math.atan2(point_m[1], point_m[0]), near) if length > ON_THE_AXIS_M else 0.0
     c, s = math.cos(theta), math.sin(theta)
     x, y = c * axis[0] + s * axis[1], -s * axis[0] + c * axis[1]
     a = float(c * point_m[0] + s * point_m[1])
@@ -108,11 +114,12 @@ def _last_row(T_own_flange: Floats) -> DhLink:
     return DhLink(theta, float(point_m[2]), float(c * point_m[0] + s * point_m[1]), alpha)
 
 
-def _nearer_half(theta: float) -> float:
-    """The direction of a normal, of its two signs the one nearer to the present x."""
-    if theta > math.pi / 2 + 1e-12:
-        return theta - math.pi
-    return theta + math.pi if theta < -math.pi / 2 + 1e-12 else theta
+def _nearer_half(theta: float, near: float) -> float:
+    """The direction of a normal, of its two signs the one nearer to an angle; 0 is the present x."""
+    apart = math.remainder(theta - near, math.tau)
+    if apart > math.pi / 2 + 1e-12:
+        return near + apart - math.pi
+    return near + apart + math.pi if apart < -math.pi / 2 + 1e-12 else near + apart
 
 
 def _tail(row: DhLink, tilt: float) -> Floats:

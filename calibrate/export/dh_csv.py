@@ -1,8 +1,28 @@
-"""D-H table of an identified arm as CSV: base, one row a joint with Hayati's tilt, flange."""
+"""D-H table of an identified arm as CSV: base, one row a joint with Hayati's tilt, flange.
 
-from acquisition.recording.rig import ArmModel, Pose
+And what the data determine of its numbers where the arm was fitted as poses: each is a function of the fitted
+parameters. A number that an unseen combination moves is not determined (Rao, as in calibrate/identifiability.py).
+"""
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from msgspec.structs import replace
+from numpy.typing import NDArray
+
+from acquisition.recording.rig import ArmModel, Pose, Rig
+from calibrate.arms.belief import LINK_PLAUSIBLE, ZERO_PLAUSIBLE_RAD
+from calibrate.arms.catalogue import arm_of
 from calibrate.arms.convert import Conversion, convert, pose_of
-from calibrate.export.identified import IdentifiedArm
+from calibrate.arms.table import NEAR_PARALLEL_SINE
+from calibrate.export.identified import NO_NUMBER, IdentifiedArm, identified_arm
+from calibrate.identifiability import STRUCTURAL, Identifiability, combinations_of
+from calibrate.identification.estimates import ONLY_BELIEVED
+from calibrate.model_file import ModelParameter
+from calibrate.parameters import Parameter
+
+Floats = NDArray[np.float64]
 
 TABLE = ("theta_offset_rad", "d_m", "a_m", "alpha_rad", "tilt_rad")
 FRAME = ("x_m", "y_m", "z_m", "rx_rad", "ry_rad", "rz_rad")
@@ -44,3 +64,81 @@ def dh_numbers(new: Conversion) -> list[tuple[float, float, float, float, float]
 
 def _frame(name: str, pose: Pose) -> str:
     return ",".join((name, *("" for _ in TABLE), *(repr(v) for v in (*pose.origin_m, *pose.rotation_rad))))
+
+
+NAMES = ("joint{}.zero", "link{}.offset", "link{}.length", "link{}.twist", "link{}.tilt")  # of TABLE
+PLAUSIBLE = (ZERO_PLAUSIBLE_RAD, *(LINK_PLAUSIBLE,) * 4)
+STEP = 1e-6  # m, rad: of the differences
+# An unseen combination that is off by its plausible size moves a number that is determined by less than this; it is
+# part of its sigma. Slid along near-parallel axes, a length changes by the small angle between them times the slide.
+PULLED = 0.05 * LINK_PLAUSIBLE  # m, rad
+SMALL = 1e-6  # of a scaled direction: rounding of the differences leaves 1e-9
+ONLY_PRIOR = 0.9  # of the sigma that the tolerances alone leave: beyond, the data taught nothing
+NO_PRIOR = 1e6  # m, rad
+
+
+def dh_arm(
+    rig: Rig, values: Mapping[str, float], free: Sequence[Parameter], seen: Identifiability, covariance: Floats
+) -> IdentifiedArm:
+    """The arm by its standard D-H table: nominal numbers, corrections, and which of these the data determine.
+
+    `values` are corrections of arm parameters by name; `free` are the parameters of `seen`, with their covariance.
+    """
+    drawn = convert(rig.arm, ArmModel.DH)
+    nominal = np.array(dh_numbers(drawn))
+
+    def corrections(of: Mapping[str, float]) -> Floats:
+        apart = np.array(dh_numbers(convert(rig.arm, ArmModel.DH, of))) - nominal
+        apart[:, [0, 3]] = np.remainder(apart[:, [0, 3]] + np.pi, 2.0 * np.pi) - np.pi
+        return apart.ravel()
+
+    names = [name.format(i) for i in range(1, rig.n_joints + 1) for name in NAMES]
+    found, own = corrections(values), {p.name for p in arm_of(rig).parameters}
+    J = np.zeros((len(names), len(free)))
+    for k, name in enumerate(p.name for p in free):
+        if name in own:
+            up, down = ({**values, name: values.get(name, 0.0) + step} for step in (STEP, -STEP))
+            J[:, k] = (corrections(up) - corrections(down)) / (2.0 * STEP)
+    together = _together(names, J, [p for p in free if p.name not in own], free, seen)
+    tilted = np.abs(np.sin(nominal[:, 3])) < NEAR_PARALLEL_SINE
+    tilted[-1] = False  # nothing turns behind it
+    pulled, prior = np.linalg.norm(J @ seen.unseen, axis=1), np.minimum([p.prior for p in free], NO_PRIOR)
+    stated = list[ModelParameter]()
+    for i, name in enumerate(names):
+        unit, sigma = "m" if name.endswith(("offset", "length")) else "rad", float(np.sqrt(J[i] @ covariance @ J[i]))
+        moved = np.abs(J[i]) > SMALL
+        why = None if sigma < ONLY_PRIOR * np.linalg.norm((J[i] * prior)[moved]) else ONLY_BELIEVED
+        if pulled[i] > PULLED or not np.isfinite(sigma):
+            why = together.get(name, NO_NUMBER)
+        if not np.any(moved):
+            why = "held at its nominal value"
+        numbers = (None, None) if why else (float(found[i]), float(np.hypot(sigma, pulled[i])))
+        if not name.endswith("tilt") or tilted[i // len(NAMES)]:
+            stated.append(ModelParameter(name, unit, *numbers, why))
+    in_dh = replace(rig, arm=replace(drawn.arm, make=rig.arm.make))
+    return identified_arm(in_dh, dict(zip(names, found.tolist(), strict=True)), stated=stated)
+
+
+def _together(
+    names: list[str], J: Floats, others: Sequence[Parameter], free: Sequence[Parameter], seen: Identifiability
+) -> dict[str, str]:
+    """Number -> what it is seen together with: unseen directions in the numbers, base, target and fixture."""
+    scaled = J / np.tile(PLAUSIBLE, len(names) // len(NAMES))[:, None]
+    beside = np.array([[(p is other) / p.plausible for p in free] for other in others]).reshape(-1, len(free))
+    rows = np.concatenate([scaled, beside]) @ seen.unseen
+    weakest = STRUCTURAL * seen.singular_values.max(initial=0.0)
+    never = _basis(rows[:, seen.singular_values[seen.rank :] < weakest])
+    basis = np.concatenate([never, _basis(rows - never @ (never.T @ rows))], axis=1)
+    every = (*names, *(p.name for p in others))
+    out = dict[str, str]()
+    for found in combinations_of(basis, every, never.shape[1], np.linalg.norm(basis, axis=1) > SMALL):
+        owners = dict.fromkeys(n if n in names else n.partition(".")[0] for n in found.spoken)
+        says = dataclasses.replace(found, spoken=tuple(owners)).says
+        out |= {name: says for name in found.members if name not in out}
+    return out
+
+
+def _basis(columns: Floats) -> Floats:
+    """Orthonormal basis (row, rank) of what the columns span."""
+    U, s, _ = np.linalg.svd(columns, full_matrices=False)
+    return U[:, s > SMALL]

@@ -18,12 +18,17 @@ from acquisition.recording.rig import ArmModel, Joint, Make, Pose
 from calibrate.arms.coupled_readings import by_reading
 from calibrate.effects.term import decimals_of
 from calibrate.export.identified import NO_NUMBER, IdentifiedArm
+from calibrate.identifiability import plainly
+from calibrate.report.not_determined import in_plain_words
+from calibrate.report.quantities import fixed
 
 ZERO = (0.0, 0.0, 0.0)
 AXIS = {Make.KUKA: "A"}  # what the makes call their axes; J elsewhere
 DEGREES, MILLIMETRES = (math.degrees(1.0), "deg"), (1e3, "mm")
 DH = (("offset", "d_m"), ("length", "a_m"), ("twist", "alpha_rad"), ("tilt", None))  # correction, drawn number
 POE = ("x", "y", "z", "roll", "pitch", "yaw")
+UNIT = {"deg": "°", "mm": "mm"}
+NOMINAL_DECIMALS = 2  # of a nominal value beside which there is no sigma
 HEADING = ("parameter", "unit", "nominal", "correction", "sigma", "calibrated", "not_determined_because")
 
 
@@ -58,6 +63,17 @@ def nominal_table_text(arm: IdentifiedArm) -> str:
         numbers = (to_sigma(value, row.sigma) for value in (row.correction, row.sigma, row.calibrated))
         lines.append(",".join((row.parameter, row.unit, repr(row.nominal), *numbers, quoted(row.why))))
     return "\n".join(lines) + "\n"
+
+
+def cells(row: NominalRow) -> tuple[str, ...]:
+    """Name, nominal, correction, sigma, calibrated for a person; the reason in place of the last three."""
+    name = f"{row.parameter if '.' not in row.parameter else plainly([row.parameter])} ({UNIT[row.unit]})"
+    if row.correction is None or row.sigma is None or row.calibrated is None:
+        head, _, words = row.why.rpartition(": ")
+        why = f"{head}: {in_plain_words(words)}" if " + " in words else row.why
+        return name, fixed(row.nominal, NOMINAL_DECIMALS), f"{NO_NUMBER}: {why}" if why != NO_NUMBER else why
+    decimals = decimals_of(row.sigma)
+    return name, *(fixed(v, decimals) for v in (row.nominal, row.correction, row.sigma, row.calibrated))
 
 
 def to_sigma(value: float | None, sigma: float | None) -> str:

@@ -13,18 +13,23 @@ from msgspec import structs
 from numpy.typing import NDArray
 
 from acquisition.recording import Recording
-from acquisition.recording.rig import Rig
+from acquisition.recording.rig import ArmModel, Rig
+from calibrate.arms.catalogue import arm_of
 from calibrate.arms.model import KinematicModel
+from calibrate.converted_rig import rig_in_model
 from calibrate.dual_psd_rig import dual_psd_chain
 from calibrate.errors import DataError
+from calibrate.export.dh_csv import dh_arm
+from calibrate.export.identified import IdentifiedArm, identified_arm
 from calibrate.fit import solve
 from calibrate.fit_plan import DEFAULT, parse_plan
+from calibrate.identifiability import analyse
 from calibrate.identification.planned import rig_as_planned, samples_as_planned
 from calibrate.identification.session import instruments_for_fit, standing_at
 from calibrate.joint_problem import JointProblem
 from calibrate.model_file import ModelFile
 from calibrate.observations import Observations
-from calibrate.parameters import Parameter, index_of, start_values
+from calibrate.parameters import Parameter, index_of, start_values, without_assumed
 from calibrate.problem import Problem
 from calibrate.read_samples import observations
 from calibrate.report.quantities import angle, length
@@ -174,6 +179,30 @@ class SessionEvidence:
         covariance = np.zeros((len(names), len(names)))
         covariance[np.ix_(at, at)] = found.rows
         return spare_readings(self.problem, self.theta, covariance)
+
+    @cached_property
+    def calibrated_arm(self) -> IdentifiedArm:
+        """The arm as tables have it: an arm of poses by its standard D-H table, another one by its own numbers."""
+        model = self.model
+        rig = rig_in_model(self.recording.rig, ArmModel(model.arm_model))
+        values = {p.name: model.chain.get(p.name, 0.0) for p in arm_of(rig).parameters}
+        if rig.arm.model is not ArmModel.LOCAL_POE or model.effects:
+            some = [
+                p for p in model.parameters if rig.arm.model is not ArmModel.LOCAL_POE or p.name.startswith("joint")
+            ]
+            return identified_arm(rig, values, stated=some, covariance=model.covariance)
+        free = [i for i, p in enumerate(self.parameters) if p.free]
+        covariance, stated = np.full((len(free),) * 2, np.nan), {p.name: p.sigma for p in model.parameters if p.sigma}
+        if (known := model.covariance) is not None:  # its names are the free ones less those that the fit held
+            at = [k for k, i in enumerate(free) if self.parameters[i].name in known.names]
+            covariance = np.zeros_like(covariance)
+            covariance[np.ix_(at, at)] = known.rows
+            wider = [stated[n] / np.sqrt(known.rows[k][k]) for k, n in enumerate(known.names) if n in stated]
+            covariance *= (
+                float(np.median(wider or [1.0])) ** 2
+            )  # for noise that is known from few readings, as in their sigmas
+        seen = analyse(self.problem.jacobian(self.theta), without_assumed(self.parameters))
+        return dh_arm(rig, values, [self.parameters[i] for i in free], seen, covariance)
 
     @property
     def left_out(self) -> int:

@@ -6,14 +6,12 @@ was read, so its nominal numbers are those of the axis as the controller counts,
 (acquisition/recording/rig/senses.py).
 """
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from math import degrees
+from collections.abc import Iterator
 
 import numpy as np
 
-from acquisition.recording.rig import ArmModel, Joint, Rig
 from calibrate.default_belief import said_of
+from calibrate.export.nominal_table import cells, nominal_table
 from calibrate.identifiability import WEAK
 from calibrate.identification.session import holds_spots
 from calibrate.model_file import ModelFile, ModelParameter
@@ -161,86 +159,24 @@ def _refusals(evidence: SessionEvidence, refused: list[ModelParameter]) -> Html:
     )
 
 
+HEAD = ("nominal", "correction", "± sigma", "calibrated")
 LEAD = (
     "Calibrated = nominal + correction, in the robot’s own signs: the true angle of a joint is its reading plus this "
     "offset. The calibrated values belong together; use all of them or none."
 )
-NOMINAL_DECIMALS = 2  # of a nominal value beside which there is no sigma
-
-
-@dataclass(frozen=True)
-class ArmNumber:
-    """One number of the table, m or rad."""
-
-    owner: str  # "J2", "link 3"
-    what: str
-    name: str  # of the parameter
-    unit: str  # "m" or "rad"
-    nominal: float
-    correction: float | None  # None: not determined
-    sigma: float | None
-    why: str = ""  # there is no correction
-
-
-def arm_numbers(rig: Rig, parameters: Sequence[ModelParameter]) -> tuple[ArmNumber, ...]:
-    """Joint offsets first, then links; of an arm of poses only the offsets, since its links are no single numbers."""
-    found = {p.name: p for p in parameters}
-    listed = [
-        (f"J{i}", "offset", f"joint{i}.zero", "rad", joint.theta_offset_rad or 0.0)
-        for i, joint in enumerate(rig.arm.joints, start=1)
-    ]
-    if rig.arm.model is not ArmModel.LOCAL_POE:
-        listed += [row for i, joint in enumerate(rig.arm.joints, start=1) for row in _link(rig.arm.model, i, joint)]
-    return tuple(_arm_number(found[row[2]], *row) for row in listed if row[2] in found)
-
-
-def _link(model: ArmModel, i: int, joint: Joint) -> Iterator[tuple[str, str, str, str, float]]:
-    """Owner, what, parameter, unit, nominal; a modified table has length and twist of the link in front."""
-    behind = i - 1 if model is ArmModel.MDH else i
-    yield f"link {i}", "d", f"link{i}.offset", "m", joint.d_m or 0.0
-    yield f"link {behind}", "a", f"link{behind}.length", "m", joint.a_m or 0.0
-    yield f"link {behind}", "alpha", f"link{behind}.twist", "rad", joint.alpha_rad or 0.0
-    yield f"link {behind}", "tilt (beta)", f"link{behind}.tilt", "rad", 0.0
-
-
-def _arm_number(found: ModelParameter, owner: str, what: str, name: str, unit: str, nominal: float) -> ArmNumber:
-    why = "" if found.value is not None else found.undetermined or "not determined"
-    return ArmNumber(owner, what, name, unit, nominal, found.value, found.sigma, why)
 
 
 def table_part(evidence: SessionEvidence) -> Iterator[Html]:
     """The joints' offsets, and folded the links; nothing where the model has none of them."""
-    numbers = arm_numbers(evidence.recording.rig, evidence.model.parameters)
-    joints = [n for n in numbers if n.what == "offset"]
-    links = [n for n in numbers if n.what != "offset" and n.correction is not None]
-    if not numbers:
+    rows = nominal_table(evidence.calibrated_arm)
+    joints = [cells(row) for row in rows if "." not in row.parameter]
+    links = [row for row in rows if "." in row.parameter]
+    if not rows:
         return
     yield tag("h3", "Nominal, correction, calibrated")
     yield tag("p", LEAD, cls="lead")
-    if joints:
-        yield _table(joints, evidence, ("Joint", "nominal (°)", "correction (°)", "± sigma (°)", "calibrated (°)"))
+    yield table(("Joint", *HEAD), joints, numeric=(1, 2, 3, 4))
     if links:
-        left = sum(n.what != "offset" for n in numbers) - len(links)
-        title = f"Links: {len(links)} numbers" + (f"; {left} more are not determined" if left else "")
-        head = ("Number", "nominal", "correction", "± sigma", "calibrated")
-        yield folded(title, halves(_table(links, evidence, head)))
-
-
-def _table(numbers: Sequence[ArmNumber], evidence: SessionEvidence, head: tuple[str, ...]) -> Html:
-    return table(head, (_row(n, evidence) for n in numbers), numeric=(1, 2, 3, 4))
-
-
-def _row(n: ArmNumber, evidence: SessionEvidence) -> tuple[str, ...]:
-    joint = n.what == "offset"
-    name = n.owner if joint else f"{n.owner}, {n.what} ({'mm' if n.unit == 'm' else '°'})"
-    nominal = _in_unit(n, n.nominal)
-    if n.correction is None or n.sigma is None:
-        why = reason_among(n.name, evidence.model.unseen, n.why)
-        return name, fixed(nominal, NOMINAL_DECIMALS), f"not determined: {why}"
-    decimals = decimals_of(_in_unit(n, n.sigma))
-    values = (nominal, _in_unit(n, n.correction), _in_unit(n, n.sigma), _in_unit(n, n.nominal + n.correction))
-    return name, *(fixed(value, decimals) for value in values)
-
-
-def _in_unit(n: ArmNumber, value: float) -> float:
-    return 1e3 * value if n.unit == "m" else degrees(value)
+        left = sum(row.correction is None for row in links)
+        title = f"D-H table: {len(links)} numbers" + (f", {left} of them not determined" if left else "")
+        yield folded(title, halves(table(("Number", *HEAD), map(cells, links), numeric=(1, 2, 3, 4))))

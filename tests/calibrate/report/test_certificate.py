@@ -7,14 +7,16 @@ from math import degrees
 from pathlib import Path
 
 import msgspec
+import numpy as np
 import pytest
 
 from acquisition.recording.errors import RecordingError
 from acquisition.recording.rig import load_rig, parse_rig, rig_text
 from acquisition.recording.rig.schema import Site, SiteInstrument
+from calibrate.export.identified import identified_arm
+from calibrate.export.nominal_table import cells, nominal_table
 from calibrate.model_file import ModelParameter
 from calibrate.report.elements import Html, page
-from calibrate.report.sections.parameter_tables import arm_numbers
 from calibrate.report.sections.summary import certificate
 
 RIG = Path(__file__).parents[3] / "rigs" / "ur5e-dual-psd.toml"
@@ -74,16 +76,18 @@ def test_calibrated_is_nominal_plus_correction_in_the_robots_signs():
         ModelParameter("link2.length", "m", 2e-4, 1e-5, None),
         ModelParameter("joint6.zero", "rad", None, None, "no data of this kind"),
     ]
-    first, last, length = arm_numbers(parse_rig(text, "rig"), parameters)
-    assert (first.owner, first.nominal, first.correction) == ("J1", -0.25, 0.01)
-    assert (length.what, length.nominal, length.correction) == ("a", -0.425, 2e-4)
-    assert (last.correction, last.why) == (None, "no data of this kind")
+    arm = identified_arm(parse_rig(text, "rig"), {"joint1.zero": 0.01, "link2.length": 2e-4}, stated=parameters)
+    shown = {words[0]: words[1:] for words in map(cells, nominal_table(arm))}
+    first = [float(word.replace("\N{MINUS SIGN}", "-")) for word in shown["J1 (°)"]]
+    assert first == pytest.approx(np.degrees([-0.25, 0.01, 1e-4, -0.24]), abs=5e-5)
+    assert shown["a2 (mm)"] == ("\N{MINUS SIGN}425.000", "0.200", "0.010", "\N{MINUS SIGN}424.800")
+    assert shown["J6 (°)"][1:] == ("not determined: no data of this kind",)
 
 
 def test_the_first_screen_has_the_table_in_degrees(spots, spots_html):
     known = next(p for p in spots.model.parameters if p.name == "joint2.zero")
     rows = re.findall(r"<tr>(.*?)</tr>", spots_html, flags=re.DOTALL)
-    own = next(re.sub(r"<[^>]*>", " ", row) for row in rows if ">J2<" in row)
+    own = next(re.sub(r"<[^>]*>", " ", row) for row in rows if ">J2 (°)<" in row)
     numbers = [float(n.replace("\N{MINUS SIGN}", "-")) for n in re.findall(r"[−-]?\d+\.\d+", own)]
     nominal, correction, sigma, calibrated = numbers
     assert correction == pytest.approx(degrees(known.value), abs=sigma)

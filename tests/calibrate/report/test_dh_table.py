@@ -1,0 +1,91 @@
+"""The D-H table of an arm of poses: what the data determine lies within its sigma of the axes of the emulated arm."""
+
+import re
+
+import numpy as np
+import pytest
+
+from acquisition.recording import read
+from calibeam.cli import run
+from calibrate.export.nominal_table import cells, nominal_table
+from calibrate.model_file import read_model
+from calibrate.report.sections.parameter_tables import table_part
+from calibrate.report.session_evidence import session_evidence
+
+from ..export.tracked import tracked
+
+WRONG_M = 3e-4  # of origins; of axes in rad
+
+
+@pytest.fixture(scope="module", params=["kuka-kr6-r900", "fanuc-lrmate-200id"])
+def identified(request, tmp_path_factory):
+    """Folder of a session of a wrong arm, its evidence."""
+    at = tmp_path_factory.mktemp("dh")
+    folder = tracked(at / "session", request.param, lengths_m=WRONG_M)
+    assert run(["identify", str(folder), "--out", str(at / "model.json")]) == 0
+    return at, session_evidence(read(folder), read_model(at / "model.json"))
+
+
+def rows_of(evidence):
+    return {row.parameter: row for row in nominal_table(evidence.calibrated_arm)}
+
+
+def between(one, other):
+    """Length of the common normal and angle of two axes; of near-parallel ones the distance of the other's point."""
+    (p, u), (r, v) = one, other
+    normal = np.cross(u, v)
+    angle = np.arctan2(np.linalg.norm(normal), u @ v)
+    if np.linalg.norm(normal) < 0.01:
+        return np.linalg.norm(r - p - ((r - p) @ u) * u), angle
+    return abs((r - p) @ normal) / np.linalg.norm(normal), angle
+
+
+def test_lengths_and_twists_are_those_between_the_axes_of_the_real_arm(identified):
+    at, evidence = identified
+    axes, rows = np.load(at / "axes.npy"), rows_of(evidence)
+    for i in range(5):
+        length_m, angle_rad = between(axes[i], axes[i + 1])
+        length, twist = rows[f"link{i + 1}.length"], rows[f"link{i + 1}.twist"]
+        assert abs(abs(length.calibrated) - 1e3 * length_m) < 4.0 * length.sigma < 0.1
+        if i != 1:  # between parallel axes twist and tilt are two parts of one small angle
+            assert abs(abs(twist.calibrated) - np.degrees(angle_rad)) < 4.0 * twist.sigma < 0.03
+    away = [row for name, row in rows.items() if name.startswith("link") and row.correction is not None]
+    assert sum(abs(row.correction) > 4.0 * row.sigma for row in away) > 5  # the nominal arm is another one
+
+
+def test_what_no_tracker_of_unknown_place_shows_has_a_reason_and_no_number(identified):
+    rows = rows_of(identified[1])
+    first, last = [name for name in rows if "." not in name][::5]
+    without = {name: row.why for name, row in rows.items() if row.correction is None}
+    among = {"link1.offset", "link2.offset", "link3.offset", "link6.offset", "link6.length", "link6.twist"}
+    assert set(without) == {first, last, *among}
+    assert "device" in without[first]
+    assert "tool" in without[last]
+    assert without["link2.offset"] == "only in combination: link2.offset + link3.offset"
+
+
+def test_page_and_terminal_show_every_joint_and_number_to_two_digits_of_sigma(
+    identified, capsys, tmp_path, monkeypatch
+):
+    monkeypatch.setenv("COLUMNS", "120")
+    at, evidence = identified
+    page = "".join(table_part(evidence))
+    assert run(["identify", str(at / "session"), "--out", str(tmp_path / "model.json"), "--verbose"]) == 0
+    terminal = [re.split(r"\s*[│┃]\s*", line) for line in capsys.readouterr().out.splitlines()]
+    for shown in map(cells, rows_of(evidence).values()):
+        if len(shown) < 5:
+            assert "not determined" in shown[2]
+            continue
+        assert len(re.sub(r"^[0.]*", "", shown[3]).replace(".", "")) == 2
+        assert len({len(number.partition(".")[2]) for number in shown[1:]}) == 1
+        assert all(f">{number}" in page for number in shown)
+        assert any(list(shown) == line[1:6] for line in terminal)
+
+
+def test_beside_held_lengths_only_zeros_have_numbers(identified, tmp_path):
+    folder, out = identified[0] / "session", tmp_path / "zeros.json"
+    assert run(["identify", str(folder), "--zeros-only", "--out", str(out)]) == 0
+    rows = rows_of(session_evidence(read(folder), read_model(out)))
+    known = [name for name, row in rows.items() if row.correction is not None]
+    assert [name[1:] for name in known] == ["2", "3", "4", "5"]
+    assert {row.why for name, row in rows.items() if name.startswith("link")} == {"held at its nominal value"}
