@@ -174,7 +174,7 @@ def figures() -> tuple[Figure, ...]:
 
 TODAY = {
     "files": 812,  # docs/decisions/0042-what-is-promised.md
-    "code": 80_300,  # docs/decisions/0042-what-is-promised.md
+    "code": 80_600,  # docs/decisions/0042-what-is-promised.md
     "longest_function": 54,
     "one_importer": 15,
     "classes": 26,

@@ -6,8 +6,8 @@ import numpy as np
 
 from acquisition.recording.rig import Rig
 from calibeam.console import Console
-from calibeam.printing.one_point import of_one_point
 from calibeam.printing.tables import plain_table
+from calibeam.rig_files import of_one_point
 from calibrate.diagnose.diagnosis import Named
 from calibrate.diagnose.smallest_visible import Smallest
 from calibrate.pose_design.design import Design

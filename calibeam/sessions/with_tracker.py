@@ -28,8 +28,8 @@ from calibeam.interrupts import INTERRUPTS
 from calibeam.live.feed import SILENT, Feed, Progress
 from calibeam.motion.reachable_poses import candidates_of, way_is_clear
 from calibeam.outcome import PartialResult
-from calibeam.printing.one_point import of_one_point
 from calibeam.printing.progress import progress_bar
+from calibeam.rig_files import of_one_point
 from calibeam.sessions.job import GO_ON, PLAN_NOTE, SEED_NOTE, plan_sha256
 from calibeam.sessions.keys import Keys
 from calibeam.sessions.person import Person, devices_ready

@@ -5,9 +5,9 @@ from pathlib import Path
 import pytest
 
 from acquisition.recording.rig import parse_rig
-from calibeam.printing.one_point import of_one_point
+from calibeam.rig_files import of_one_point
 
-RIGS = Path(__file__).parents[3] / "rigs"
+RIGS = Path(__file__).parents[2] / "rigs"
 TARGETS = "".join(f"\n[[target]]\nid = {k}\npoint_m = [0.0, 0.0, 0.{k}]\npoint_sigma_m = 2e-5\n" for k in (1, 2, 3))
 
 
