@@ -108,14 +108,19 @@ def _judged(case: Case, found: Corrected, asked: Wanted, tool: Floats, of: Promi
 
 def _off_m(case: Case, q_rad: Floats, point_m: Floats, goal_m: Floats) -> Floats:
     """(pose,) distances, after the motion that brings the one best onto the other (Kabsch)."""
+    reached_m = true_tips_m(case, q_rad, point_m)
+    a, b = reached_m - reached_m.mean(axis=0), goal_m - goal_m.mean(axis=0)
+    turn, _ = Rotation.align_vectors(b, a)
+    return np.asarray(np.linalg.norm(turn.apply(a) - b, axis=1), dtype=np.float64)
+
+
+def true_tips_m(case: Case, q_rad: Floats, point_m: Floats) -> Floats:
+    """(pose, 3) in the base, where the concealed arm has a point (3,) of its flange at commands (pose, joint)."""
     scene = at_start(case.table.scene, q_rad, np.random.default_rng(1))
     if "payload_kg" not in case.recorded:  # a load that nobody recorded belongs to the arm, and stays
         scene = replace(scene, payload_kg=np.full(len(q_rad), case.table.scene.payload_kg[0]))
     T = stand(case.drawn.true, scene, [one.defect for one in case.hidden], q_rad).T_base_tool
-    reached_m = T[:, :3, :3] @ point_m + T[:, :3, 3]
-    a, b = reached_m - reached_m.mean(axis=0), goal_m - goal_m.mean(axis=0)
-    turn, _ = Rotation.align_vectors(b, a)
-    return np.asarray(np.linalg.norm(turn.apply(a) - b, axis=1), dtype=np.float64)
+    return np.asarray(T[:, :3, :3] @ point_m + T[:, :3, 3], dtype=np.float64)
 
 
 def lines(found: Sequence[Promise]) -> Iterator[str]:
