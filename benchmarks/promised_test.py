@@ -1,4 +1,4 @@
-"""`python -m benchmarks.promised_test [SEEDS]`: the pose accuracy that `iso9283` prints as corrected, and the arm's own.
+"""`python -m benchmarks.promised_test [SEEDS]`: the pose accuracy that `iso9283` prints as corrected, and the arm's.
 
 The arms and models of `promised`. Each arm is sent to the five poses of its test cube, 30 cycles with the noise of the
 tracker, and the test is evaluated with the model: AP as the model predicts it, and as corrected. Then it is sent to the
