@@ -18,15 +18,7 @@ from calibrate.parameters import Parameter, plausible_sizes, priors
 from calibrate.sensors.catalogue import FRAMES
 from calibrate.solvers.linear import triangle_of
 
-__all__ = [
-    "STRUCTURAL",
-    "WEAK",
-    "Combination",
-    "Identifiability",
-    "analyse",
-    "combinations_of",
-    "in_words",
-]
+__all__ = ["STRUCTURAL", "WEAK", "Combination", "Identifiability", "analyse", "combinations_of", "in_words"]
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]

@@ -79,16 +79,16 @@ def urdf_arm(path: Path, base_link: str | None = None, tip_link: str | None = No
 def ur_kinematics_rig(path: Path) -> str:
     """The rig file of the UR that a kinematics YAML describes. DataError naming file, body, key and remedy."""
     text, body = read_text(path, "UR kinematics", DataError), ""
-    found, says = dict[str, dict[str, str]](), ""
+    found = dict[str, dict[str, str]]()
     for line in re.split(r"[\n{},]", re.sub("#.*", "", text)):  # blocks, or braces
         key, _, value = (word.strip() for word in line.partition(":"))
-        says = value if key == "hash" else says
         body = body if value or not key else key
         found.setdefault(body, {})[key] = value
     parts = [_ur_part(path, name, found) for name in BODIES]
     flange = _ur_part(path, FLANGE, found) if FLANGE in found else np.eye(4)
     turns = [ANY_TURN_RAD, ANY_TURN_RAD, math.pi, *(ANY_TURN_RAD,) * 3]  # joint_limits.yaml: the elbow half a turn
-    notes = f"From {path.name}: a UR as its factory calibrated it ({says or 'no hash'}).\nThe file has no masses."
+    says = found[BODIES[-1]].get("hash", "no hash")  # the last line
+    notes = f"From {path.name}: a UR as its factory calibrated it ({says}).\nThe file has no masses."
     joints = tuple(DrawnJoint(T, -turn, turn) for T, turn in zip(parts, turns, strict=True))
     return poe_text(DrawnArm(path.stem, joints, flange, (notes,))).replace("[arm]\n", '[arm]\nmake = "ur"\n', 1)
 

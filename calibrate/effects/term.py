@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from calibrate.effects.drivers import Drivers
 from calibrate.effects.ports import Port
+from calibrate.report.quantities import decimals_of
 
 Floats = NDArray[np.float64]
 
@@ -188,10 +189,3 @@ def with_sigma(value: float, sigma: float) -> str:
         return f"{value:.4g}"
     decimals = decimals_of(sigma)
     return f"{value:z.{decimals}f} ± {sigma:.{decimals}f}"
-
-
-def decimals_of(sigma: float) -> int:
-    """Decimals that show two digits of the uncertainty."""
-    if not (math.isfinite(sigma) and sigma > 0.0):
-        return 3
-    return max(0, 1 - math.floor(math.log10(sigma)))

@@ -74,7 +74,6 @@ STEP = 1e-6  # m, rad: of the differences
 PULLED = 0.05 * LINK_PLAUSIBLE  # m, rad
 SMALL = 1e-6  # of a scaled direction: rounding of the differences leaves 1e-9
 ONLY_PRIOR = 0.9  # of the sigma that the tolerances alone leave: beyond, the data taught nothing
-NO_PRIOR = 1e6  # m, rad
 
 
 def dh_arm(
@@ -102,7 +101,7 @@ def dh_arm(
     together = _together(names, J, [p for p in free if p.name not in own], free, seen)
     tilted = np.abs(np.sin(nominal[:, 3])) < NEAR_PARALLEL_SINE
     tilted[-1] = False  # nothing turns behind it
-    pulled, prior = np.linalg.norm(J @ seen.unseen, axis=1), np.minimum([p.prior for p in free], NO_PRIOR)
+    pulled, prior = np.linalg.norm(J @ seen.unseen, axis=1), np.minimum([p.prior for p in free], 1e6)
     stated = list[ModelParameter]()
     for i, name in enumerate(names):
         unit, sigma = "m" if name.endswith(("offset", "length")) else "rad", float(np.sqrt(J[i] @ covariance @ J[i]))

@@ -159,13 +159,14 @@ def export_model(path: Path, rig: Rig, model: ModelFile, form: ExportForm) -> tu
     _refuse_coupled(rig, form)
     soft = _linear_compliance(rig, model) if form.springs else {}
     says = _not_carried(model, tuple(soft)) if model.effects else ()
+    with_links = any(name.startswith("link") and value != 0.0 for name, value in model.chain.items())
     if form.offsets:
-        says = (*_beside_offsets(model), *says)
+        says = (*_beside_offsets(model, with_links=with_links), *says)
     compliance = {int(e.where.removeprefix("joint").split(".")[0]): c for e, c in soft.values()}
     arm = identified_arm(
         rig, corrections(model), model.about.get("tool"), says, model.parameters, compliance, model.covariance
     )
-    if form.offsets and _with_links(model):
+    if form.offsets and with_links:
         says = (*says, NO_OFFSETS if all(refused(zero) for zero in arm.zeros) else TOGETHER)
         arm = replace(arm, not_carried=says)
     write_output(path, cleaned(form.text(arm)), export_output(form))
@@ -220,13 +221,8 @@ def _not_carried(model: ModelFile, carried: tuple[str, ...]) -> tuple[str, ...]:
     return not_carried(model, carried).sentences
 
 
-def _with_links(model: ModelFile) -> bool:
-    """Whether lengths or axes were corrected, too."""
-    return any(name.startswith("link") and value != 0.0 for name, value in model.chain.items())
-
-
-def _beside_offsets(model: ModelFile) -> tuple[str, ...]:
+def _beside_offsets(model: ModelFile, *, with_links: bool) -> tuple[str, ...]:
     """What the nominal arm with the zeros of the model is off: from a whole model, or from the measured points."""
     from calibrate.export.not_carried import geometry_lost, left_by_zeros
 
-    return (geometry_lost(model),) if model.effects or _with_links(model) else left_by_zeros(model)
+    return (geometry_lost(model),) if model.effects or with_links else left_by_zeros(model)

@@ -16,11 +16,10 @@ from scipy.spatial.transform import Rotation
 
 from acquisition.recording.rig import ArmModel, Joint, Make, Pose
 from calibrate.arms.coupled_readings import by_reading
-from calibrate.effects.term import decimals_of
 from calibrate.export.identified import NO_NUMBER, IdentifiedArm
 from calibrate.identifiability import plainly
 from calibrate.report.not_determined import in_plain_words
-from calibrate.report.quantities import fixed
+from calibrate.report.quantities import decimals_of, fixed
 
 ZERO = (0.0, 0.0, 0.0)
 AXIS = {Make.KUKA: "A"}  # what the makes call their axes; J elsewhere

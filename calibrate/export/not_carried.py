@@ -135,19 +135,20 @@ def geometry_lost(model: ModelFile) -> str:
 
 def left_by_zeros(model: ModelFile) -> tuple[str, ...]:
     """What the nominal arm with the identified zeros misses the readings by, as the model of these zeros has it."""
-    says = {one: angle if kind_of(one).quantities[0].unit == "rad" else length for one in model.instruments}
-    first, of = says[model.instruments[0]], f" of {model.instruments[0]}" if len(says) > 1 else ""
-    return (
-        f"remaining error with these offsets, lengths and axes nominal: {first(model.rms_distance_after_m)} rms at the "
-        f"measured points{of} (nominal arm {first(model.rms_distance_before_m)})",
-        *(
-            f"remaining error on unseen rows ({p.split}){f', {p.instrument}' if len(says) > 1 else ''}: "
-            f"{says[p.instrument](p.rms_distance_after_m)} rms (nominal arm "
-            f"{says[p.instrument](p.rms_distance_before_m)})"
-            for p in model.proofs
-        ),
-        *(f"unseen rows: no proof ({why})" for why in model.unproven),
-    )
+    at_points = ("at the measured points", model.instruments[0])
+    rows = [(*at_points, model.rms_distance_before_m, model.rms_distance_after_m)]
+    rows += [
+        (f"on unseen rows ({p.split})", p.instrument, p.rms_distance_before_m, p.rms_distance_after_m)
+        for p in model.proofs
+    ]
+    out = list[str]()
+    for where, name, before, after in rows:
+        says = angle if kind_of(name).quantities[0].unit == "rad" else length
+        of = f" of {name}" if len(model.instruments) > 1 else ""
+        out.append(
+            f"remaining error with these offsets alone{of}, {where}: {says(after)} rms; nominal arm {says(before)}"
+        )
+    return (*out, *(f"unseen rows: no proof ({why})" for why in model.unproven))
 
 
 def _left_over(tip_m: Floats, wanted_m: Floats) -> Floats:

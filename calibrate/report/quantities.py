@@ -3,8 +3,6 @@
 import math
 from collections.abc import Sequence
 
-from calibrate.effects.term import decimals_of
-
 MINUS = "\N{MINUS SIGN}"
 DIGIT_SPACE = "\N{FIGURE SPACE}"  # as wide as a digit
 POINT_SPACE = "\N{PUNCTUATION SPACE}"  # as wide as a point
@@ -14,6 +12,13 @@ TIED = "\N{NO-BREAK SPACE}"  # a number and its unit stay on one line
 RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 LENGTHS = ((1.0, "m"), (1e-3, "mm"), (1e-6, "µm"), (1e-9, "nm"))
 ANGLES = ((1.0, "rad"), (1e-3, "mrad"), (1e-6, "µrad"), (1e-9, "nrad"))
+
+
+def decimals_of(sigma: float) -> int:
+    """Decimals that show two digits of the uncertainty."""
+    if not (math.isfinite(sigma) and sigma > 0.0):
+        return 3
+    return max(0, 1 - math.floor(math.log10(sigma)))
 
 
 def fixed(value: float, decimals: int) -> str:

@@ -186,11 +186,10 @@ class SessionEvidence:
         model = self.model
         rig = rig_in_model(self.recording.rig, ArmModel(model.arm_model))
         values = {p.name: model.chain.get(p.name, 0.0) for p in arm_of(rig).parameters}
-        if rig.arm.model is not ArmModel.LOCAL_POE or model.effects:
-            some = [
-                p for p in model.parameters if rig.arm.model is not ArmModel.LOCAL_POE or p.name.startswith("joint")
-            ]
-            return identified_arm(rig, values, stated=some, covariance=model.covariance)
+        poses = rig.arm.model is ArmModel.LOCAL_POE
+        if not poses or model.effects:
+            listed = [p for p in model.parameters if not poses or p.name.startswith("joint")]
+            return identified_arm(rig, values, stated=listed, covariance=model.covariance)
         free = [i for i, p in enumerate(self.parameters) if p.free]
         covariance, stated = np.full((len(free),) * 2, np.nan), {p.name: p.sigma for p in model.parameters if p.sigma}
         if (known := model.covariance) is not None:  # its names are the free ones less those that the fit held
@@ -198,9 +197,7 @@ class SessionEvidence:
             covariance = np.zeros_like(covariance)
             covariance[np.ix_(at, at)] = known.rows
             wider = [stated[n] / np.sqrt(known.rows[k][k]) for k, n in enumerate(known.names) if n in stated]
-            covariance *= (
-                float(np.median(wider or [1.0])) ** 2
-            )  # for noise that is known from few readings, as in their sigmas
+            covariance *= np.median(wider or [1.0]) ** 2  # for noise known from few readings, as in these sigmas
         seen = analyse(self.problem.jacobian(self.theta), without_assumed(self.parameters))
         return dh_arm(rig, values, [self.parameters[i] for i in free], seen, covariance)
 

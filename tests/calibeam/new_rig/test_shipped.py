@@ -1,6 +1,7 @@
 """Every shipped rig is read, says its source, and reaches what its source says.
 
-Positions at zero (mm) are sums of the drawn lengths; reach (m) is that of the wrist centre, as the model's name or the
+Positions at zero (mm), in the controller's world, are sums of the drawn lengths: of FANUC, Motoman and Stäubli it is at
+the height of axis 2, as the fixed joint base_link-base of their sources has it; reach (m) is that of the wrist centre, as the model's name or the
 maker's page has it: KUKA R900 and R820, ABB 0.58 and 1.45. UR10e: manual, "Maximum Payload", workspace of 1300 mm.
 """
 
@@ -16,13 +17,13 @@ AT_ZERO_MM = {
     "abb-irb120": (302 + 72, 0, 290 + 270 + 70),
     "abb-irb1600-6-1.2": (150 + 600 + 65, 0, 486.5 + 475),
     "abb-irb1600-8-1.45": (150 + 600 + 65, 0, 486.5 + 700),
-    "fanuc-lrmate-200id": (50 + 335 + 80, 0, 330 + 330 + 35),
+    "fanuc-lrmate-200id": (50 + 335 + 80, 0, 330 + 35),
     "franka-fr3": (88, 0, 333 + 316 + 384 - 107),
     "franka-panda": (88, 0, 333 + 316 + 384 - 107),
     "kuka-iiwa14-r820": (0, 0, 360 + 420 + 400 + 152),
     "kuka-kr6-r900": (25 + 455 + 420 + 80, 0, 400 + 35),
-    "motoman-gp8": (40 + 340 + 80, 0, 330 + 345 + 40),
-    "staubli-tx2-60": (0, 20, 375 + 290 + 310 + 70),
+    "motoman-gp8": (40 + 340 + 80, 0, 345 + 40),
+    "staubli-tx2-60": (0, 20, 290 + 310 + 70),
     "ur10e": (-612.7 - 571.55, -174.15 - 116.55, 180.7 - 119.85),
     "ur16e": (-478.4 - 360, -174.15 - 116.55, 180.7 - 119.85),
     "ur20": (-862 - 728.7, -201 - 154.3, 236.3 - 159.3),
