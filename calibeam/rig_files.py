@@ -3,10 +3,25 @@
 from pathlib import Path
 
 from acquisition.recording.rig import Rig
+from calibrate.errors import DataError
 
 CHECKOUT = Path(__file__).parents[1] / "rigs"
 INSTALLED = Path(__file__).parent / "rigs"  # made by the wheel: pyproject.toml, force-include
 RIGS = INSTALLED if INSTALLED.is_dir() else CHECKOUT
+ROBOTS = {"ur5e": "ur5e-tracker", "irb120": "irb120-modbus"}  # who asks for a robot gets it with these devices
+
+
+def rig_path(given: Path) -> Path:
+    """A rig file by its path, or a shipped one with its devices by name: `ur5e`. DataError for a name of none."""
+    if given.suffix or given.exists():
+        return given
+    shipped = {path.stem: path for path in sorted(RIGS.glob("*.toml"))}
+    shipped |= {robot: shipped[rig] for robot, rig in ROBOTS.items() if rig in shipped}
+    if str(given) not in shipped:
+        raise DataError(f"{given}: no rig file, and none is shipped under this name: {', '.join(shipped)}")
+    return shipped[str(given)]
+
+
 SEVERAL = 3  # targets that show how the flange lies
 
 

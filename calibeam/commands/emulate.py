@@ -12,6 +12,7 @@ from cyclopts import Parameter
 from acquisition.recording.output import text_output
 from acquisition.recording.rig import load_rig, plain_rig, rig_text
 from calibeam.overwriting import writes
+from calibeam.rig_files import rig_path
 
 if TYPE_CHECKING:
     from simulators.defects import Defect
@@ -40,6 +41,7 @@ def emulate(
 
     ```
     calibeam emulate rigs/ur5e-dual-psd.toml
+    calibeam emulate ur5e
     ```
 
     It prints where each device listens. Send a line of JSON to the address "control" to inject a fault, for example
@@ -57,7 +59,7 @@ def emulate(
     Parameters
     ----------
     rig
-        The rig file; devices without a section in [devices] are not emulated.
+        The rig file, or the name of a shipped one; devices without a section in [devices] are not emulated.
     json_
         Print one line of JSON when all are ready: where each device listens.
     robot_host
@@ -86,6 +88,7 @@ def emulate(
     """
     from simulators.serve import ServeOptions, serve  # the physics takes a second to load: only here
 
+    rig = rig_path(rig)
     stated = load_rig(rig).devices.robot  # reports what is wrong with the file in its own words
     plain = plain_rig(rig_text(rig), str(rig))
     given, mechanisms = _simulated(rig, plain, model, hide)

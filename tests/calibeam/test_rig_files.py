@@ -5,7 +5,8 @@ from pathlib import Path
 import pytest
 
 from acquisition.recording.rig import parse_rig
-from calibeam.rig_files import of_one_point
+from calibeam.rig_files import of_one_point, rig_path
+from calibrate.errors import DataError
 
 RIGS = Path(__file__).parents[2] / "rigs"
 TARGETS = "".join(f"\n[[target]]\nid = {k}\npoint_m = [0.0, 0.0, 0.{k}]\npoint_sigma_m = 2e-5\n" for k in (1, 2, 3))
@@ -23,3 +24,14 @@ TARGETS = "".join(f"\n[[target]]\nid = {k}\npoint_m = [0.0, 0.0, 0.{k}]\npoint_s
 def test_one_target_does_not_show_how_the_flange_is_turned(rig, more, open_):
     text = (RIGS / f"{rig}.toml").read_text(encoding="utf-8")
     assert bool(of_one_point(parse_rig(text + more, "rig.toml"))) == open_
+
+
+def test_a_shipped_rig_is_found_by_its_name_or_its_robot(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert rig_path(Path("ur5e")).name == "ur5e-tracker.toml"
+    assert rig_path(Path("ur5e-dual-psd")).is_file()
+    assert rig_path(Path("mine.toml")) == Path("mine.toml")
+    with pytest.raises(DataError, match="irb120-modbus"):
+        rig_path(Path("ur55"))
+    (tmp_path / "ur5e").write_text("")
+    assert rig_path(Path("ur5e")) == Path("ur5e")  # a file of the user's own comes first
