@@ -1,43 +1,43 @@
-"""For pytest in other projects: `calibeam_emulation`, the emulated devices of a rig for one test or one module.
+"""For pytest in other projects: the emulated devices of a rig for one test.
 
-pytest loads it by its entry point, so nothing of calibeam is imported before a test asks for it.
+def test_my_driver(start_emulators):
+    emulators = start_emulators("ur5e", time_scale=2.0)
+    emulators.inject("robot", "silence", count=10)
+
+pytest loads this by its entry point, so nothing else of calibeam is imported before a test asks for it.
 """
 
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import pytest
 
 if TYPE_CHECKING:
-    from calibeam.emulation import Emulation
-
-Emulate = Callable[..., "Emulation"]
-
-
-def _emulating() -> Generator[Emulate]:
-    with ExitStack() as running:
-
-        def emulate(rig: str | Path, *, seed: int | None = None, time_scale: float | None = None) -> "Emulation":
-            from calibeam.emulation import Emulation
-            from calibeam.rig_files import rig_path
-
-            return running.enter_context(Emulation(rig_path(Path(rig)).resolve(), seed=seed, time_scale=time_scale))
-
-        yield emulate
+    from simulators.process import Emulators
 
 
 @pytest.fixture
-def calibeam_emulation() -> Generator[Emulate]:
-    """`calibeam_emulation("ur5e")` starts the emulators of a rig file or a shipped rig, and ends them with the test.
+def start_emulators() -> Iterator[Callable[..., "Emulators"]]:
+    """Starts the emulators of a rig, as often as a test likes; all have ended when the test has.
 
-    What it returns has `address`: device -> where it listens, and `ask` for faults (docs/protocols/faults.md).
+    The rig is a path, the name of a shipped one, or what `tomllib` reads of a file; options are those of Emulators.
     """
-    yield from _emulating()
+    with ExitStack() as running:
+
+        def start(rig: str | Path | Mapping[str, Any], **options: Any) -> "Emulators":
+            from simulators.process import Emulators
+
+            content = rig if isinstance(rig, Mapping) else _content(Path(rig))
+            return running.enter_context(Emulators(content, **{"links": False, **options}))
+
+        yield start
 
 
-@pytest.fixture(scope="module")
-def calibeam_module_emulation() -> Generator[Emulate]:
-    """The same for a whole module: emulators take a second to start."""
-    yield from _emulating()
+def _content(given: Path) -> Mapping[str, Any]:
+    from acquisition.recording.rig import plain_rig, rig_text
+    from calibeam.rig_files import rig_path
+
+    path = rig_path(given)
+    return plain_rig(rig_text(path), str(path))

@@ -26,7 +26,7 @@ SEVERAL = 3  # targets that show how the flange lies
 
 
 def of_one_point(rig: Rig) -> str:
-    """What a session with one target leaves open, told before it is taken.
+    """What a session with one target leaves open, for a person before it is taken.
 
     Empty where several targets show how the flange lies, or detectors or a probe stand in place of targets. The size is
     that of docs/correct.md, measured by benchmarks/promised.py.

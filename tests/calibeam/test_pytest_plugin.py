@@ -9,9 +9,8 @@ import pytest
 TEST = """
 import socket
 
-def test_a_controller_answers(calibeam_emulation):
-    emulation = calibeam_emulation("ur5e", time_scale=4.0)
-    robot = emulation.address["robot"]
+def test_a_controller_answers(start_emulators):
+    robot = start_emulators("ur5e", time_scale=4.0).address["robot"]
     with socket.create_connection((robot["host"], 30004), timeout=5.0):
         pass
 """

@@ -1,8 +1,9 @@
 """Every shipped rig is read, says its source, and reaches what its source says.
 
 Positions at zero (mm), in the controller's world, are sums of the drawn lengths: of FANUC, Motoman and Stäubli it is at
-the height of axis 2, as the fixed joint base_link-base of their sources has it; reach (m) is that of the wrist centre, as the model's name or the
-maker's page has it: KUKA R900 and R820, ABB 0.58 and 1.45. UR10e: manual, "Maximum Payload", workspace of 1300 mm.
+the height of axis 2, as the fixed joint base_link-base of their sources has it; reach (m) is that of the wrist centre,
+as the model's name or the maker's page has it: KUKA R900 and R820, ABB 0.58 and 1.45. UR10e: manual, "Maximum
+Payload", workspace of 1300 mm.
 """
 
 import numpy as np

@@ -7,8 +7,8 @@ from typing import Any
 import pytest
 
 from acquisition.recording.rig import plain_rig, rig_text
+from calibeam.pytest_plugin import start_emulators  # noqa: F401 - the fixture under test
 from simulators.process import Emulators
-from simulators.pytest_plugin import start_emulators  # noqa: F401 - the fixture under test
 
 RIG_PATH = Path(__file__).parents[3] / "rigs" / "ur5e-dual-psd.toml"
 
