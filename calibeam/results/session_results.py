@@ -23,7 +23,7 @@ from calibrate.report.drift.two_calibrations import Calibration, drift_of
 from calibrate.report.elements import write_page
 from calibrate.report.session_evidence import session_evidence
 from calibrate.report.session_report import session_answers, session_page
-from calibrate.report.verdict import Answers
+from calibrate.report.verdict import TOOL, Answers
 from calibrate.report.workspace.workspace_errors import session_arm, session_room
 
 NOW = "now"
@@ -85,9 +85,19 @@ def _concluded(recording_path: Path, console: Console) -> Identification:
     print_identification(console, result, session_evidence(recording, model))
     console.print(f"model: {folder / 'model.json'}", markup=False)
     diagnosis = write_session_diagnosis(recording, folder, console)
-    write_recording_report(recording, model, folder / "report.html", diagnosis)
+    answers = write_recording_report(recording, model, folder / "report.html", diagnosis)
     console.print(f"report: {folder / 'report.html'}", markup=False)
+    console.print(accuracy_of(answers), style="bold", markup=False, highlight=False)
     return result
+
+
+def accuracy_of(answers: Answers) -> str:
+    """One number for whoever asks how good the arm is now, as the first screen of the report has it, and its limit."""
+    tool = [number for number in answers.numbers if number.key.startswith(TOOL) and number.value is not None]
+    if not tool:
+        return answers.verdict.sentence
+    limit = f"; {answers.limit}" if answers.limit else ""
+    return f"in one number: tool error {tool[-1].said} ({tool[-1].name}; {tool[0].said} {tool[0].name}){limit}"
 
 
 def _folder_of(recording_path: Path) -> Path:

@@ -76,6 +76,7 @@ class Answers:
     verdict: Verdict
     numbers: tuple[Number, ...]
     known: tuple[str, ...] = ()  # what to know before the numbers are used: what is missing, what limits
+    limit: str = ""  # the step that would make the tool error smaller, where one does
     also: tuple[str, ...] = ()  # smaller numbers, in words
     drift: str = ""  # what changed since another calibration, in one sentence
     warnings: tuple[str, ...] = ()  # what to know before that sentence is relied on

@@ -18,7 +18,7 @@ from calibrate.report.session_evidence import Readings, SessionEvidence
 from calibrate.report.session_verdict import session_verdict
 from calibrate.report.verdict import Answers, Number, first_screen
 from calibrate.report.workspace.pictures import tool_maps
-from calibrate.report.workspace.workspace_errors import Room, tool_numbers
+from calibrate.report.workspace.workspace_errors import Room, limit_of, tool_numbers
 from calibrate.sensors.catalogue import kind_of
 
 TITLE = "Certificate"
@@ -117,7 +117,7 @@ def answers(evidence: SessionEvidence, room: Room | str, diagnosis: DiagnosisFil
         f"rows of the fit: {first.says(_rms(first.error_after))} rms distance",
     )
     numbers = (*tool_numbers(room, diagnosis), *_errors(evidence), _anywhere(model.free_space))
-    return Answers(session_verdict(evidence, diagnosis), numbers, limits, also)
+    return Answers(session_verdict(evidence, diagnosis), numbers, limits, limit_of(room), also)
 
 
 MAPS = (

@@ -255,6 +255,14 @@ def limited(known: KnownArm, room: Room, undetermined: Sequence[str]) -> Room:
     return replace(room, limited_by=names, if_known_m=left_m) if names and left_m < MOST * np.sqrt(whole) else room
 
 
+def limit_of(room: Room | str) -> str:
+    """What makes most of the calibrated error, and what would be left without it; empty where nothing does alone."""
+    if isinstance(room, str) or not room.limited_by:
+        return ""
+    named = " and ".join(in_plain_words(name) for name in room.limited_by)
+    return f"limited by {named}: measured in another way, {length(room.if_known_m)} would be left"
+
+
 def tool_numbers(room: Room | str, diagnosis: DiagnosisFile | None = None) -> Iterator[Number]:
     """Over the workspace, where the data support a statement: nominal arm, calibrated, and with the physics found.
 

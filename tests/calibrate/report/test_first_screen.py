@@ -8,6 +8,7 @@ import msgspec
 import numpy as np
 import pytest
 
+from calibeam.results.session_results import accuracy_of
 from calibrate.report.session_evidence import session_evidence
 from calibrate.report.session_report import session_answers
 from calibrate.report.verdict import MARKS, Answers, Number, Trust, Verdict, first_screen
@@ -94,3 +95,13 @@ def test_no_letter_of_a_figure_is_smaller_than_seven_points_on_paper(session_htm
         assert len(letters.printed) >= 6
         small = {label: round(size, 2) for label, size in letters.printed.items() if size < LEAST_PT}
         assert small == {}
+
+
+@pytest.mark.parametrize(("limit", "ends"), [("", "nominal)"), ("limited by link 6", "; limited by link 6")])
+def test_a_session_ends_with_one_number_and_what_limits_it(limit, ends):
+    tool = [Number(f"tool_{k}", k, 1e-4, "m", said, "") for k, said in (("nominal", "9 mm"), ("calibrated", "4 µm"))]
+    other = Number("now", "unseen", 1e-5, "m", "5 µm", "")
+    said = accuracy_of(Answers(Verdict(Trust.CARE, "It is so.", (), ()), (*tool, other), limit=limit))
+    assert "4 µm" in said
+    assert "5 µm" not in said
+    assert said.endswith(ends)
