@@ -2,7 +2,8 @@
 
 Arms of three makes with errors of links and zeros, a soft joint and an eccentric encoder disc are measured by a tracker
 and diagnosed; the model corrects poses for the measured point and for a torch that nobody measured. Both are looked up
-in the world, after the rigid motion that no tracker of unknown place can show. Ratio: true rms over predicted rms.
+in the world, after the rigid motion that no tracker of unknown place can show: the one that brings the point which was
+measured best onto where the model has it. Ratio: true rms over predicted rms.
 """
 
 import io
@@ -21,8 +22,10 @@ from acquisition.recording.rig import parse_rig
 from calibeam.cli import run
 from calibeam.motion.motion_inverse import MotionInverse
 from calibrate.arms.rig_arm import RigArm
-from calibrate.correct.corrected import Corrected, Options, Wanted, correct
-from calibrate.model_file import read_model
+from calibrate.correct.corrected import Corrected, Options, Wanted, as_samples, correct
+from calibrate.model_file import ModelFile, read_model
+from calibrate.physics.predicting import placed
+from calibrate.predict import Predictor
 from simulators.arm.kinematics import forward
 from simulators.conceal import wanted as concealed
 from simulators.conceal.case import Case, conceal
@@ -91,27 +94,35 @@ def promises(arm: str, seed: int, targets: int, placed_m: float | None) -> Itera
         at = measured if stated is None else stated
         asked = Wanted(T @ at, np.full(q_rad.shape, np.nan), q_rad, {"payload_kg": np.zeros(POSES)})
         found = correct(model, asked, solver, Options(tool=stated))
-        yield _judged(case, found, asked, at, Promise(arm, seed, name_of, tool, 0.0, 0.0, 0.0, 0.0))
+        yield _judged(case, model, found, asked, at, Promise(arm, seed, name_of, tool, 0.0, 0.0, 0.0, 0.0))
 
 
-def _judged(case: Case, found: Corrected, asked: Wanted, tool: Floats, of: Promise) -> Promise:
+def _judged(case: Case, model: ModelFile, found: Corrected, asked: Wanted, tool: Floats, of: Promise) -> Promise:
     """Against where the true arm has the tool, at the commands before and after."""
     good = np.isfinite(found.q_rad).all(axis=1)
     goal_m = asked.T_base_tool[good, :3, 3]
     # The measured point is where it truly sits; a stated tool is exact.
     at_m = np.atleast_2d(case.drawn.true.tool_point_m)[0] if of.tool == "measured" else tool[:3, 3]
-    before, after = (_off_m(case, q[good], at_m, goal_m) for q in (found.nominal_rad, found.q_rad))
+    B = _motion(case, model, found.q_rad[good])
+    before, after = (
+        np.linalg.norm(true_tips_m(case, q[good], at_m) @ B[:3, :3].T + B[:3, 3] - goal_m, axis=1)
+        for q in (found.nominal_rad, found.q_rad)
+    )
     within = after <= INSIDE * np.hypot(found.after.error_m[good], found.after.s_error_m[good])
     rms = [float(np.sqrt(np.mean(off**2))) for off in (before, after)]
     return replace(of, before_m=rms[0], printed_m=found.after.rms_m, true_m=rms[1], inside=float(np.mean(within)))
 
 
-def _off_m(case: Case, q_rad: Floats, point_m: Floats, goal_m: Floats) -> Floats:
-    """(pose,) distances, after the motion that brings the one best onto the other (Kabsch)."""
-    reached_m = true_tips_m(case, q_rad, point_m)
-    a, b = reached_m - reached_m.mean(axis=0), goal_m - goal_m.mean(axis=0)
-    turn, _ = Rotation.align_vectors(b, a)
-    return np.asarray(np.linalg.norm(turn.apply(a) - b, axis=1), dtype=np.float64)
+def _motion(case: Case, model: ModelFile, q_rad: Floats) -> Floats:
+    """(4, 4) that brings the measured point of the concealed arm best onto that of the model (Kabsch)."""
+    known = placed(model, as_samples(q_rad, {"payload_kg": np.zeros(len(q_rad))}))
+    there_m = Predictor.of(model).measured_at(known.T_base_flange)
+    truly_m = true_tips_m(case, q_rad, np.atleast_2d(case.drawn.true.tool_point_m)[0])
+    a, b = truly_m - truly_m.mean(axis=0), there_m - there_m.mean(axis=0)
+    out = np.eye(4)
+    out[:3, :3] = Rotation.align_vectors(b, a)[0].as_matrix()
+    out[:3, 3] = there_m.mean(axis=0) - out[:3, :3] @ truly_m.mean(axis=0)
+    return out
 
 
 def true_tips_m(case: Case, q_rad: Floats, point_m: Floats) -> Floats:

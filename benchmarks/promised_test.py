@@ -75,13 +75,10 @@ def tested(arm: str, seed: int) -> Tested | None:
         return None
     rng = np.random.default_rng([seed, 9])
     test = evaluate(_seen(case, rig, cube.q_rad, CYCLES, rng), rig, model, plan)
-    after = evaluate(_seen(case, rig, sent.q_rad, 2, None), rig, None, plan, frame="fit")
+    after = evaluate(_seen(case, rig, sent.q_rad, 2, None), rig, model, plan)
     if test.corrected is None:
         return None
-    fitted = evaluate(_seen(case, rig, cube.q_rad, CYCLES, rng), rig, model, plan, frame="fit")
-    if fitted.corrected is None:
-        return None
-    printed, true = _accuracies(fitted.corrected), _accuracies(after.measured)
+    printed, true = _accuracies(test.corrected), _accuracies(after.measured)
     sigma = np.array([s for _, s in test.predicted_m.values()])
     return Tested(
         arm,
