@@ -117,7 +117,7 @@ def _motion(case: Case, model: ModelFile, q_rad: Floats) -> Floats:
     """(4, 4) that brings the measured point of the concealed arm best onto that of the model (Kabsch)."""
     known = placed(model, as_samples(q_rad, {"payload_kg": np.zeros(len(q_rad))}))
     there_m = Predictor.of(model).measured_at(known.T_base_flange)
-    points_m = np.atleast_2d(case.drawn.true.tool_point_m)  # of each row of the session, where there are several targets
+    points_m = np.atleast_2d(case.drawn.true.tool_point_m)  # of each row, where targets are several
     first = np.argmin(np.linalg.norm(points_m - np.array(case.drawn.believed.tool_point_m), axis=1))
     truly_m = true_tips_m(case, q_rad, points_m[first])
     a, b = truly_m - truly_m.mean(axis=0), there_m - there_m.mean(axis=0)
