@@ -17,7 +17,7 @@ from calibeam.motion.motion_inverse import MotionInverse
 from calibeam.outcome import PartialResult
 from calibeam.overwriting import writes
 from calibrate.arms.rig_arm import RigArm
-from calibrate.correct.corrected import Corrected, Options, Wanted, correct
+from calibrate.correct.corrected import Corrected, FrameError, Options, Wanted, correct
 from calibrate.correct.frames import measured_frame
 from calibrate.correct.programs.rewriting import correct_program, dialect_of
 from calibrate.correct.tables import corrected_rows, read_points, read_poses
@@ -115,17 +115,28 @@ def correct_command(
     console = Console(soft_wrap=True, highlight=False)
     job = _Job.of(model, start, condition)
     job = replace(job, frame=_frame(console, job, frame, points, options))
-    found, names, frames, left, notes = (
+    found, names, frames, called, left, notes = (
         _table(job, poses, out, options)
         if poses.suffix.lower() == ".csv"
         else _program(console, job, poses, out, options, verbose)
     )
+    if points is not None and job.frame is not None:  # measured again just now
+        called = ["" if np.array_equal(T, job.frame) else name for T, name in zip(frames, called, strict=True)]
     needless = tuple(
         f"{c} is given; no effect of the model depends on it"
         for c in job.every
         if c not in conditions_of_effects(job.known)
     )
-    _print_found(console, job.known, found, names, frames, left, (*needless, *notes, *found.notes), verbose)
+    _print_found(
+        console,
+        job.known,
+        found,
+        names,
+        left,
+        found.of_frames(frames, called),
+        (*needless, *notes, *found.notes),
+        verbose,
+    )
     console.print(f"corrected: {out}", markup=False)
     lost, count = int(np.sum(~np.isfinite(found.q_rad).all(axis=1))), len(names) + left
     if lost + left:
@@ -156,7 +167,8 @@ class _Job:
         return cls(known, rig.n_joints, near_rad, _conditions(condition), None, MotionInverse(RigArm.of_rig(rig)))
 
 
-Done = tuple[Corrected, list[str], Floats, int, tuple[str, ...]]  # names, frames, how many are left alone, notes
+# Names, frames and their names, how many are left alone, notes.
+Done = tuple[Corrected, list[str], Floats, list[str], int, tuple[str, ...]]
 
 
 def _frame(console: Console, job: _Job, given: tuple[str, ...], points: Path | None, options: Options) -> Floats | None:
@@ -196,7 +208,8 @@ def _table(job: _Job, poses: Path, out: Path, options: Options) -> Done:
         if c not in conditions_of_effects(job.known) and c not in job.every
     )
     names = [f"pose {row + 1}" for row in range(len(wanted))]
-    return found, names, np.broadcast_to(place, (len(names), 4, 4)), 0, given
+    called = "parts in the robot's own base" if job.frame is None else "the frame of --frame"
+    return found, names, np.broadcast_to(place, (len(names), 4, 4)), [called] * len(names), 0, given
 
 
 def _program(console: Console, job: _Job, poses: Path, out: Path, options: Options, verbose: bool) -> Done:
@@ -225,7 +238,8 @@ def _program(console: Console, job: _Job, poses: Path, out: Path, options: Optio
     notes = [of_file(sentence) for sentence in (*done.skipped, *done.seams)]
     if done.kept:
         notes.append(f"{len(done.kept)} joint targets kept as they are ({', '.join(done.kept[:3])}): --joint-targets")
-    return done.found, names, done.frames, len(done.skipped), tuple(notes)
+    called = [of_file(name) for name in done.frame_names]
+    return done.found, names, done.frames, called, len(done.skipped), tuple(notes)
 
 
 def _with_partner(poses: Path, out: Path) -> tuple[list[Path], list[Path]]:
@@ -271,8 +285,8 @@ def _print_found(
     model: ModelFile,
     found: Corrected,
     names: list[str],
-    frames: Floats,
     left: int,
+    of_frames: tuple[FrameError, ...],
     notes: tuple[str, ...],
     verbose: bool,
 ) -> None:
@@ -286,13 +300,12 @@ def _print_found(
         f"{UM * found.before.rms_m:.0f} µm before, {UM * found.after.rms_m:.1f} µm after"
     )
     say(f"{commanded} of {len(names) + left} poses corrected{rms if commanded else ''}")
-    as_they_are = found.frames_as_they_are(frames)
-    if commanded and as_they_are > FRAMES_LIMIT * found.after.rms_m:
-        after = f"{UM * found.after.rms_m:.1f} µm holds with these"
-        say(
-            f"measure bases and work objects again with the corrected arm (--frame NAME --points): {after}; those "
-            f"taught before hold the old errors, and leave about {UM * as_they_are:.0f} µm"
-        )
+    for one in of_frames:
+        if one.as_it_is_m > FRAMES_LIMIT * one.again_m:
+            say(
+                f"measure again: {one.name}: {UM * one.again_m:.1f} µm rms measured again with the corrected arm "
+                f"(--frame NAME --points), about {UM * one.as_it_is_m:.0f} µm as taught before"
+            )
     if (far_mm := 1e3 * np.nanmax(found.before.error_m, initial=0.0)) > 10.0:  # seldom is geometry off by more
         remedy = "check the mastering, and the tool of the poses: [tool] point_m of the rig file, or --tool"
         say(f"CHECK BEFORE YOU RUN IT: corrections of up to {far_mm:.0f} mm; {remedy}")

@@ -6,7 +6,7 @@ geometric arm is sent to W D(q)^-1 for a wanted flange W, and D is evaluated aga
 leaves about a thousandth of what was left before.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Protocol
 
@@ -83,6 +83,7 @@ class Options:
     overshoot_rad: float = np.radians(2.0)
     margin_rad: float = np.radians(1.0)  # to a limit of a joint: nearer is reported
     joint_targets: bool = False  # those of a program, too, as poses of the rig file's arm
+    tool_name: str = ""  # as the program has it
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,9 +99,22 @@ class ToolErrors:
     @property
     def rms_m(self) -> float:
         """Of the error that is to be expected: the predicted one and its sigma together, over what is reached."""
-        known = self.error_m[np.isfinite(self.error_m)]
-        sigma = np.nan_to_num(self.s_error_m[np.isfinite(self.error_m)])
-        return float(np.sqrt(np.mean(known**2 + sigma**2))) if len(known) else float("nan")
+        return self.rms_where(np.ones(len(self.error_m), dtype=bool))
+
+    def rms_where(self, rows: Bools) -> float:
+        """The same over some rows (pose,)."""
+        known = rows & np.isfinite(self.error_m)
+        squares = self.error_m[known] ** 2 + np.nan_to_num(self.s_error_m[known]) ** 2
+        return float(np.sqrt(np.mean(squares))) if len(squares) else float("nan")
+
+
+@dataclass(frozen=True)
+class FrameError:
+    """Rms of the error that is to be expected at the poses of a frame: with it measured again, and as it is."""
+
+    name: str
+    again_m: float
+    as_it_is_m: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,12 +131,19 @@ class Corrected:
     says: tuple[str, ...]  # why, where the status is not ok
     notes: tuple[str, ...]
 
-    def frames_as_they_are(self, frames: Floats) -> float:
-        """Rms of the error that is to be expected (m) where the frames (pose, 4, 4) of the poses were taught with the
-        uncorrected arm: each holds the rigid motion that lies best on that arm's errors at its poses.
+    def of_frames(self, frames: Floats, names: Sequence[str]) -> tuple[FrameError, ...]:
+        """Of each frame (pose, 4, 4) with its names, empty for a pose in none. One that was taught with the uncorrected
+        arm holds the rigid motion that lies best on that arm's errors at its poses.
         """
-        held_m = taken_up(frames, self.T_base_tool[:, :3, 3], self.before.shift_m)
-        return float(np.hypot(self.after.rms_m, np.sqrt(np.nanmean(held_m**2)))) if np.isfinite(held_m).any() else 0.0
+        keys, out = _alike(frames), list[FrameError]()
+        keys[np.array([not name for name in names])] = -1
+        held_m = _held(keys, self.T_base_tool[:, :3, 3], self.before.shift_m)
+        for key in dict.fromkeys(keys[np.isfinite(held_m) & (keys >= 0)].tolist()):
+            rows = keys == key
+            again_m = self.after.rms_where(rows)
+            called = ", ".join(dict.fromkeys(names[row] for row in np.flatnonzero(rows).tolist()))
+            out.append(FrameError(called, again_m, float(np.hypot(again_m, np.sqrt(np.nanmean(held_m[rows] ** 2))))))
+        return tuple(out)
 
 
 def correct(
@@ -163,7 +184,7 @@ def correct(
     if via_rad is not None:
         via_rad = np.where(good[:, None], via_rad, np.nan)
     if options.tool is not None:
-        notes = (*notes, *arms.of_tool(after))
+        notes = (*notes, *arms.of_tool(after, options.tool_name))
     if arms.low_rad is None:
         notes = (*notes, "the model does not hold its recorded joint range: poses beyond it are not marked")
     return Corrected(q_rad, nominal_rad, via_rad, told, before, after, status, says, notes)
@@ -210,20 +231,18 @@ class Arms:
         """One sigma of where the stated tool is, for want of knowing how the flange lies."""
         return self.flange.sigma_m(self.stated_tool[:3, 3])
 
-    def of_tool(self, after: ToolErrors) -> tuple[str, ...]:
+    def of_tool(self, after: ToolErrors, name: str) -> tuple[str, ...]:
         """A sentence where a stated tool is worth less than the corrected arm."""
         sigma_m, lever_m = self.s_tool_m, self.flange.lever_m(self.stated_tool[:3, 3])
         if sigma_m <= after.rms_m * UNMEASURED:
             return ()
-        far = (
-            f"lies {1e3 * lever_m:.0f} mm from the nearest measured point"
-            if np.isfinite(lever_m)
-            else "is not measured"
-        )
+        points = "measured point" if len(self.flange.measured_m) == 1 else "nearest measured point"
+        far = f"lies {1e3 * lever_m:.0f} mm from the {points}" if np.isfinite(lever_m) else "is not measured"
+        named = f"tool {name}" if name else "the tool"
         return (
-            f"the tool {far}, and how the flange is turned is known to ± {1e3 * self.flange.sigma_rad:.1g} mrad only: "
-            f"± {1e6 * sigma_m:.2g} µm of the predicted error; teach this tool again on the robot, or measure three "
-            "points of it as [[target]] in one session",
+            f"{named} {far}: teach it again, or measure three points of it as [[target]] "
+            f"in one session; the flange's turn is known to ± {1e3 * self.flange.sigma_rad:.1g} mrad only, which is "
+            f"± {1e6 * sigma_m:.0f} µm of the predicted error",
         )
 
 
@@ -337,7 +356,15 @@ def _solved(
 
 def taken_up(frames: Floats, goal_m: Floats, shift_m: Floats) -> Floats:
     """(pose,) m that frames (pose, 4, 4) hold of shifts (pose, 3), wanted less reached, at their poses (pose, 3)."""
-    keys = np.unique(np.round(frames, SAME).reshape(len(frames), -1), axis=0, return_inverse=True)[1].ravel()
+    return _held(_alike(frames), goal_m, shift_m)
+
+
+def _alike(frames: Floats) -> NDArray[np.intp]:
+    """(pose,) the same number for the same frame (pose, 4, 4)."""
+    return np.unique(np.round(frames, SAME).reshape(len(frames), -1), axis=0, return_inverse=True)[1].ravel()
+
+
+def _held(keys: NDArray[np.intp], goal_m: Floats, shift_m: Floats) -> Floats:
     out = np.full(len(goal_m), np.nan)
     for key in np.unique(keys):
         rows = np.flatnonzero((keys == key) & np.isfinite(shift_m).all(axis=1))

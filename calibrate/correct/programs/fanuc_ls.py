@@ -13,7 +13,7 @@ from calibrate.correct.rotations import FANUC
 
 POSITION = re.compile(r"P\[\s*(?P<number>\d+)[^\]]*\]\s*\{(?P<body>[^}]*)\}")
 FIELD = re.compile(rf"\b(?P<key>X|Y|Z|W|P|R|J[1-9])\s*=\s*(?P<number>{NUMBER})\s*(?P<unit>mm|deg)")
-FRAMES = (("user frame", re.compile(r"UF\s*:\s*(?P<n>\w+)")), ("tool frame", re.compile(r"UT\s*:\s*(?P<n>\w+)")))
+FRAMES = (("UF", re.compile(r"UF\s*:\s*(?P<n>\w+)")), ("UT", re.compile(r"UT\s*:\s*(?P<n>\w+)")))
 GROUP = re.compile(r"\bGP(?P<n>\d+)\s*:(?P<fields>(?:(?!\bGP\d)[^}])*)")
 # The end of an arc of C stands in a line of its own.
 MOVE = re.compile(r"^[ \t]*(?:\d*:\s*[JLCA]|:)\s+(?P<register>PR?)\[\s*(?P<number>\d*)", re.MULTILINE)

@@ -153,6 +153,9 @@ def _places(code: str) -> tuple[literal.Places, dict[str, Used]]:
         base, tool = inline.get(fdat.upper(), (unknown, unknown)) if fdat else (None, None)
         what = (match["what"] or match["kind"] or "").upper()
         pose = place(what, value or f"{what}_DATA[{match['number']}]")
+        if pose.name == f"${what}":  # written out
+            line = literal.line_of(code, match.start())
+            pose = replace(pose, name=f"base as set in line {line}" if what == "BASE" else f"$TOOL of line {line}")
         return (None if what == "TOOL" else base or pose), (None if what == "BASE" else tool or pose)
 
     alone = {match.start(): match.end() for match in WITH.finditer(code)}

@@ -28,7 +28,7 @@ from calibrate.correct.corrected import (
 )
 from calibrate.correct.programs.fanuc_ls import FANUC_LS
 from calibrate.correct.programs.krl import KRL
-from calibrate.correct.programs.literal import Dialect, Literal, Move, Targets, last_before, line_of
+from calibrate.correct.programs.literal import Dialect, Literal, Move, NamedPose, Targets, last_before, line_of
 from calibrate.correct.programs.rapid import RAPID
 from calibrate.correct.programs.stated_frames import stated
 from calibrate.correct.programs.urscript import URSCRIPT
@@ -46,13 +46,14 @@ ALONG = re.compile(
 ASSIGNS = re.compile(r"\s*[\w.$\[\]{}]+\s*:?=")  # no move
 ARC = re.compile(r"\b(?:(?:Move|Arc|Cap|Cut|Disp|Paint|Trigg)C|S?CIRC\b|movec\b)", re.IGNORECASE)
 SPLINE = re.compile(r"^[ \t]*(?P<end>END|PTP_)?SPLINE\b", re.IGNORECASE | re.MULTILINE)
+OWN = re.compile(r"wobj0|\$NULLFRAME|\$WORLD|BASE_DATA\[0\]|UF 0|base")  # the robot's base, in all dialects
 DIALECTS = (URSCRIPT, KRL, RAPID, FANUC_LS)
 
 
 @dataclass(frozen=True, eq=False)
 class CorrectedProgram:
-    """`diff` unified, line by line; `names` of the targets, one a row of `found`, and `frames` (target, 4, 4) in the
-    base.
+    """`diff` unified, line by line; `names` of the targets, one a row of `found`, and of their frames, empty for joint
+    targets; `frames` (target, 4, 4) in the base.
 
     `skipped`: sentences on the others; `kept`: names of joint targets, which stay; `seams`: sentences on moves along a
     line from a target that is corrected to one that is not, or the reverse.
@@ -61,6 +62,7 @@ class CorrectedProgram:
     text: str
     diff: tuple[str, ...]
     names: tuple[str, ...]
+    frame_names: tuple[str, ...]
     frames: Floats
     found: Corrected
     skipped: tuple[str, ...]
@@ -102,7 +104,7 @@ def correct_program(
     if kept and not some:
         raise DataError(f"{name}: all {len(kept)} targets are joint targets, which stay as they are; --joint-targets")
     targets, base, tool = stated(replace(targets, literals=some), text, frame, options.tool, arms.stated_tool, name)
-    options = replace(options, tool=tool)
+    names, options = _named(targets.literals, replace(options, tool=tool))
     arms = Arms.of(model, options)
     _check(targets, dialect, options, text, name)
     if not all((np.abs(T[..., :3, :]) <= LENGTH_M).all() for T in (base, tool) if T is not None):
@@ -132,10 +134,23 @@ def correct_program(
     after, _, _ = predicted_errors(model, wanted, q_rad, conditions, options)
     new = _replaced(text, pieces)
     changes = difflib.unified_diff(text.splitlines(), new.splitlines(), name, "corrected", lineterm="", n=0)
-    names = tuple(one.name for one in targets.literals)
     found = replace(found, q_rad=q_rad, after=after)
     seams = _seams(text, targets, [bool(np.isfinite(joints).all()) for joints in q_rad])
-    return CorrectedProgram(new, tuple(changes), names, base, found, targets.skipped, kept, seams, tuple(pieces))
+    return CorrectedProgram(new, tuple(changes), *names, base, found, targets.skipped, kept, seams, tuple(pieces))
+
+
+def _named(literals: Sequence[Literal], options: Options) -> tuple[tuple[tuple[str, ...], tuple[str, ...]], Options]:
+    """Names of the targets and of their frames; the options with that of their tool."""
+    uses = [(one.joints, *one.used) for one in literals]
+    frames = tuple("" if joints else _called(places[0]) for joints, places, _ in uses)
+    tool = next((tools[0].name for joints, _, tools in uses if not joints), "")
+    return (tuple(one.name for one in literals), frames), replace(options, tool_name=tool)
+
+
+def _called(place: NamedPose) -> str:
+    """For a person: nobody measures the robot's base, but the parts in it."""
+    own = place.T is not None and OWN.fullmatch(place.name)
+    return f"parts in the robot's own base ({place.name})" if own else place.name or "the frame of --frame"
 
 
 def _behind_joints(every: Sequence[Literal], some: Sequence[Literal], dialect: Dialect) -> Iterator[tuple[int, Floats]]:

@@ -70,5 +70,9 @@ def test_a_frame_is_fitted_to_a_table_of_points_and_a_bad_frame_is_refused(tmp_p
     assert run([*asked, *start, "--frame", "table", *points]) == 0
     printed = capsys.readouterr().out
     assert "frame table: 0.400000 0.100000 0.200000" in printed.replace("\n", " ")
+    assert "measure again" not in printed  # it was just now
+    stated = [*map(str, FRAME[:3, 3]), "0.1", "-0.2", "0.7"]
+    assert run([*asked, *start, "--frame", *stated]) == 0
+    assert "\nmeasure again: the frame of --frame: " in capsys.readouterr().out
     assert run([*asked, *start, "--frame", "table"]) == 1
     assert run([*asked, *start, *points]) == 1

@@ -200,11 +200,49 @@ def fanuc(uf, ut, T):
 def test_fanuc_frames_other_than_zero_are_stated_by_the_user():
     assert_reached(corrected(fanuc(0, 0, target(np.eye(4), np.eye(4))), ".ls"))
     assert_reached(corrected(fanuc(3, 1, target(TABLE, TORCH)), ".ls", TABLE, TORCH))
-    assert "P[1]: the pose of user frame 3 is not in this file" in skipped(fanuc(3, 0, FLANGE), ".ls")
-    assert "P[1]: the pose of tool frame 1 is not in this file" in skipped(fanuc(0, 1, FLANGE), ".ls")
+    assert "P[1]: the pose of UF 3 is not in this file" in skipped(fanuc(3, 0, FLANGE), ".ls")
+    assert "P[1]: the pose of UT 1 is not in this file" in skipped(fanuc(0, 1, FLANGE), ".ls")
     assert "leave --frame out" in skipped(fanuc(0, 0, FLANGE), ".ls", TABLE)
     two = fanuc(3, 0, FLANGE).replace("/END", fanuc(4, 0, FLANGE).split("/POS\n")[1].replace("P[1]", "P[2]"))
-    assert "user frame 3, user frame 4, which the file does not hold" in skipped(two, ".ls", TABLE)
+    assert "UF 3, UF 4, which the file does not hold" in skipped(two, ".ls", TABLE)
+
+
+@pytest.mark.parametrize(
+    ("text", "suffix", "base", "tool"),
+    [
+        (rapid(), ".mod", "table", "torch"),
+        (krl(KRL_FRAMES["literal"]), ".src", "base as set in line 2", "$TOOL of line 3"),
+        (krl(KRL_FRAMES["data"]), ".src", "BASE_DATA[2]", "TOOL_DATA[3]"),
+        (fanuc(3, 1, target(TABLE, TORCH)), ".ls", "UF 3", "UT 1"),
+    ],
+)
+def test_what_has_to_be_measured_again_is_named_as_the_program_has_it(text, suffix, base, tool):
+    done = corrected(text, suffix, *((TABLE, TORCH) if suffix == ".ls" else ()))
+    (frame,) = done.found.of_frames(done.frames, done.frame_names)
+    assert frame.name == base
+    assert any(f"tool {tool}" in note and "teach it again" in note for note in done.found.notes)
+
+
+def test_each_frame_has_its_own_error():
+    """Of one pose a frame takes up the whole error that it was taught with; joint targets are in no frame."""
+    more = f"    MoveJ [{rapid_pose(FLANGE @ TORCH)},[{CONF},0],[9E9,9E9,9E9,9E9,9E9,9E9]], v50, fine, torch;\n"
+    joints = f"    MoveAbsJ [[{','.join(map(str, np.degrees(Q[0])))}],[9E9,9E9,9E9,9E9,9E9,9E9]], v50, fine, torch;\n"
+    done = correct_program(
+        model(),
+        rapid(more=more + joints),
+        dialect_of(".mod"),
+        None,
+        Q[0],
+        {},
+        inverse(),
+        Options(joint_targets=True),
+        "weld.mod",
+    )
+    table, own = done.found.of_frames(done.frames, done.frame_names)
+    assert (table.name, "own base (wobj0)" in own.name, len(done.names)) == ("table", True, 3)
+    before_m = done.found.before.error_m[0]
+    assert table.as_it_is_m == pytest.approx(np.hypot(table.again_m, before_m), rel=1e-3)
+    assert own.again_m == pytest.approx(done.found.after.rms_m, rel=0.1)
 
 
 def test_urscript_poses_have_the_tool_that_was_set_last():

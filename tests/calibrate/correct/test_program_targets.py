@@ -35,7 +35,7 @@ JOINTS = ", ".join(f"J{j} = {j}.000 deg" for j in range(1, 7))
 def test_fanuc_numbers_of_a_positioner_are_not_those_of_the_arm() -> None:
     (one,) = fanuc("1:L P[1] 50mm/sec FINE ;\n", group(1, POSE.format(5), 3) + group(2, POSITIONER, 4)).literals
     assert one.numbers[0] == 5.0
-    assert one.used[0][0].name == "user frame 3"
+    assert one.used[0][0].name == "UF 3"
     (joints,) = fanuc("1:J P[1] 100% FINE ;\n", group(1, JOINTS) + group(2, POSITIONER)).literals
     assert joints.numbers == (1.0, 2.0, 3.0, 4.0, 5.0, 6.0)
 
