@@ -120,23 +120,13 @@ def correct_command(
         if poses.suffix.lower() == ".csv"
         else _program(console, job, poses, out, options, verbose)
     )
-    if points is not None and job.frame is not None:  # measured again just now
-        called = ["" if np.array_equal(T, job.frame) else name for T, name in zip(frames, called, strict=True)]
     needless = tuple(
         f"{c} is given; no effect of the model depends on it"
         for c in job.every
         if c not in conditions_of_effects(job.known)
     )
-    _print_found(
-        console,
-        job.known,
-        found,
-        names,
-        left,
-        found.of_frames(frames, called),
-        (*needless, *notes, *found.notes),
-        verbose,
-    )
+    taught = _taught(found, frames, called, None if points is None else job.frame)
+    _print_found(console, job.known, found, names, left, taught, (*needless, *notes, *found.notes), verbose)
     console.print(f"corrected: {out}", markup=False)
     lost, count = int(np.sum(~np.isfinite(found.q_rad).all(axis=1))), len(names) + left
     if lost + left:
@@ -318,6 +308,13 @@ def _print_found(
         say(f"... {len(bad) - LISTED} more (--verbose lists all; so does the column 'says')")
     for note in notes:
         say(note)
+
+
+def _taught(found: Corrected, frames: Floats, names: list[str], measured: Floats | None) -> tuple[FrameError, ...]:
+    """Of all frames (pose, 4, 4) but the one (4, 4) that has just been measured again."""
+    if measured is not None:
+        names = ["" if np.array_equal(T, measured) else name for T, name in zip(frames, names, strict=True)]
+    return found.of_frames(frames, names)
 
 
 def _text(path: Path, encoding: str) -> str:
