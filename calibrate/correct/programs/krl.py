@@ -48,6 +48,7 @@ WAY = re.compile(
     r"|(?P<return>RETURN)|(?P<break>EXIT))\b",
     LINES,
 )
+JUMP = re.compile(r"\bGOTO[ \t]+(?P<goto>\w+)|^[ \t]*(?P<label>[A-Z]\w*)[ \t]*:", LINES)
 SET = re.compile(
     r"\$(?P<what>BASE|TOOL)(?:\.\w+)?[ \t]*=(?!=)[ \t]*(?P<value>(?:\{[^{}\n]*\}|\([^()\n]*\)|[^\n,])*)"
     r"|\bBAS\s*\(\s*#(?P<kind>BASE|TOOL)\s*,\s*(?P<number>\w+)\s*\)|\bFDAT_ACT\s*=\s*(?P<inline>\w+)",
@@ -160,6 +161,7 @@ def _places(code: str) -> tuple[literal.Places, dict[str, Used]]:
 
     alone = {match.start(): match.end() for match in WITH.finditer(code)}
     ways = routines_of(code, ROUTINE, WAY)
+    ways += [Event(m.start(), m.lastgroup or "", (m["goto"] or m["label"]).lower()) for m in JUMP.finditer(code)]
     sets: tuple[list[Event], list[Event]] = ([], [])
     for match in SET.finditer(code):
         if literal.line_start(code, match.start()) not in alone:

@@ -23,6 +23,8 @@ BLOCKS = ("if", "loop", "scope")
 CALLS = ("call", "started")
 BRANCH = "is set in a branch or a loop above, or not"
 CALLERS = "is not the same at all calls of its routine"
+LABEL = "is not the same on all ways to the label"
+NOWHERE = NamedPose(refused="no way through the program is seen to lead there")  # behind a jump
 DEEPEST = 50  # calls within calls that are followed
 LOOPS = 8  # blocks within blocks: deeper, what a loop sets is not followed
 Used = tuple[NamedPose, NamedPose]  # frame and tool
@@ -124,12 +126,13 @@ class Event:
     """A place where a program sets a frame (or a tool, which is followed by itself), or branches.
 
     `kind`: routine, call, started (as a thread or an interrupt), set, if, loop, scope, else (the next branch),
-    otherwise (the last one), break, return, end (of the innermost block or routine; of a routine it becomes "left").
+    otherwise (the last one), break, return, goto, label, end (of the innermost block or routine; of a routine it
+    becomes "left").
     """
 
     at: int
     kind: str
-    name: str = ""  # of a routine
+    name: str = ""  # of a routine or a label
     pose: NamedPose | None = None  # what is set; of a routine: with what it is entered where nothing here calls it
     words: frozenset[str] = frozenset()  # parameters of a routine; names in what is set
 
@@ -205,6 +208,7 @@ class _Flow:
         self.running.append(routine)
         opened, ends = list[tuple[str, int, NamedPose, list[NamedPose]]](), list[NamedPose]()
         state, k, body = entry, 0, self.bodies[routine]
+        jumps, jumped = dict[str, list[NamedPose]](), 0  # by label; how many of them labels were entered with
         while k < len(body):
             i, event = body[k], self.events[body[k]]
             if event.kind in BLOCKS:
@@ -225,10 +229,18 @@ class _Flow:
                 next((ways for kind, _, _, ways in reversed(opened) if kind == "loop"), ends).append(state)
             elif event.kind == "return":
                 ends.append(state)
+            elif event.kind == "goto" and self.is_set:
+                ways = jumps.setdefault(event.name, [])
+                ways += [] if any(_alike(state, other) for other in ways) else [state]
+                state = NOWHERE
+            elif event.kind == "label":
+                state = self._joined([state, *jumps.get(event.name, [])], f"{LABEL} {event.name}")
             else:
                 state = self._behind(event, state, routine)
             self.seen[i] = self._joined([self.seen.get(i, state), state], CALLERS)
             k += 1
+            if k == len(body) and (known := sum(map(len, jumps.values()))) > jumped:
+                state, k, jumped = entry, 0, known  # once more: labels above are entered from below
         self.running.pop()
         self.left[key] = self._joined([*ends, state])
         return self.left[key]
@@ -254,6 +266,7 @@ class _Flow:
         return self._refuse(why) if self.is_set else state
 
     def _joined(self, ways: Sequence[NamedPose], why: str = BRANCH) -> NamedPose:
+        ways = [one for one in ways if one is not NOWHERE] or [NOWHERE]
         if all(_alike(ways[0], other) for other in ways):
             return ways[0]
         return next((one for one in ways if one.refused), self._refuse(why))

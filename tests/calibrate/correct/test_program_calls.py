@@ -65,6 +65,36 @@ def test_a_loop_is_entered_from_its_end_too() -> None:
     assert of_krl(text.replace(f"LOOP\n{POINT}", f"LOOP\n{base(1)}{POINT}")) == [1.0, 2.0]
 
 
+LABELLED = {  # text, what each move has
+    "forth": (
+        f"{base(1)}IF $IN[1] THEN\nGOTO on\nENDIF\n{base(2)}{POINT}ON:\n{POINT}{base(3)}{POINT}",
+        [2.0, None, 3.0],
+    ),
+    "back": (f"{base(1)}again:\n{POINT}{base(2)}{POINT}IF $IN[1] THEN\nGOTO again ; once more\nENDIF\n", [None, 2.0]),
+    "back with the same": (f"{base(1)}again:\n{POINT}IF $IN[1] THEN\nGOTO again\nENDIF\n{POINT}", [1.0, 1.0]),
+    "over another branch": (
+        f"{base(1)}GOTO a\nb:\n{POINT}GOTO c\na:\n{base(2)}{POINT}GOTO b\nc:\n{POINT}",
+        [2.0, 2.0, 2.0],
+    ),
+    "out of a loop": (
+        f"{base(1)}LOOP\n{base(2)}IF $IN[1] THEN\nGOTO off\nENDIF\n{base(1)}ENDLOOP\noff:\n{POINT}",
+        [None],
+    ),
+    "where nothing leads": (f"{base(1)}GOTO off\n{POINT}off:\n{POINT}", [None, 1.0]),
+}
+
+
+@pytest.mark.parametrize(("body", "bases"), LABELLED.values(), ids=LABELLED)
+def test_a_label_is_entered_from_all_jumps_to_it(body: str, bases: list[float | None]) -> None:
+    found = of_krl(f"DEF main()\n{body}END\n")
+    assert [None if isinstance(one, str) else one for one in found] == bases
+
+
+def test_a_target_behind_a_label_is_left_with_its_reason() -> None:
+    (says,) = of_krl(f"DEF a()\n{base(1)}IF $IN[1] THEN\nGOTO on\nENDIF\n{base(2)}on:\n{POINT}END\n")
+    assert says == "the base is not the same on all ways to the label on"
+
+
 def test_a_routine_that_an_interrupt_starts_has_no_known_base() -> None:
     text = f"DEF main()\n{base(1)}INTERRUPT DECL 3 WHEN $IN[1] DO stop()\n{POINT}END\nDEF stop()\n{POINT}END\n"
     assert of_krl(text) == [1.0, "the base is that of any moment at which stop may be started"]
