@@ -25,6 +25,7 @@ EDGE_RAD = 1e-3  # across the edge of a quarter turn, or of the sign of an axis,
 NUMBER = r"[-+]?(?:\d++(?:\.\d*+)?|\.\d++)(?:[eE][-+]?\d++)?"  # no number is tried again, digit by digit
 ELEMENT = re.compile(r"(\w+)[\[{]([^:]*)[\]}]")  # of an array: its name and index
 OPENING = re.compile(r"[\s\[{]*(?:\w+\s*:)?\s*")  # before the first number of what is written out
+SHORT_IF = re.compile(r"\bIF\b(?!.*\bTHEN\b)", re.IGNORECASE | re.DOTALL)  # for the next instruction only
 LONGEST_MOVE = 500  # letters that are read of an instruction; with a target in it one has some 200
 
 
@@ -45,6 +46,7 @@ class Move:
     text: str
     frame: NamedPose = NamedPose()
     tool: NamedPose = NamedPose()
+    alone: bool = True  # what stands before it neither chooses whether it runs nor shares its line
 
 
 Moves = dict[str, list[Move]]  # by the key of their target
@@ -171,7 +173,9 @@ def blanked(text: str, comment: str) -> str:
 def instruction(text: str, at: int, places: Places, end: str = "\n") -> Move:
     """The one that begins at a place of the text, with what stands before it in its line."""
     start, stop = line_start(text, at), text.find(end, at, at + LONGEST_MOVE)
-    return Move(start, text[start : at + LONGEST_MOVE if stop < 0 else stop + len(end.strip())], *places(at))
+    since = blanked(text[max(0, start - LONGEST_MOVE) : at], "!").rpartition(";")[2] if end == ";" else ""
+    alone = not text[start:at].strip() and SHORT_IF.search(since) is None
+    return Move(start, text[start : at + LONGEST_MOVE if stop < 0 else stop + len(end.strip())], *places(at), alone)
 
 
 def moves_of(text: str, code: str, patterns: Sequence[re.Pattern[str]], places: Places, end: str = "\n") -> Moves:

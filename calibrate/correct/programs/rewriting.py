@@ -203,8 +203,9 @@ def _check_overshoots(moves: Sequence[Move], text: str, name: str) -> None:
     inside, starts, targets = list(marks.values()), list(marks), Counter(move.line_start for move in moves)
     for move in moves:
         spline, arc = last_before(inside, starts, move.line_start, False), ARC.search(re.split("[;#!]", move.text)[0])
-        if spline or arc or targets[move.line_start] > 1:
-            why = "within a spline" if spline else "along an arc" if arc else "to one of several targets"
+        if spline or arc or not move.alone or targets[move.line_start] > 1:
+            one = "to one of several targets" if move.alone else "of an IF, or behind another instruction, in its line"
+            why = "within a spline" if spline else "along an arc" if arc else one
             line = f"{name}: line {line_of(text, move.line_start)}"
             raise DataError(f"{line}: no overshoot point can stand before a move {why}; leave --approach out")
 

@@ -248,6 +248,11 @@ WITHIN_PATHS = {  # text, line of the move before which nothing can be inserted
     "index": (".src", f"BAS(#BASE, 0)\nDECL POS P[2]\nP[1] = {kuka(0)}\nP[2] = {kuka(1)}\nLIN P[I]\n", 5),
     "movec": (".script", f"movel({ur(0)})\nmovec({ur(1)}, {ur(2)})\n", 2),
     "MoveC": (".mod", f"MoveL {abb(0)}, v50, fine, tool0;\nMoveC {abb(1)}, {abb(2)}, v50, fine, tool0;\n", 2),
+    "IF": (".mod", f"MoveL {abb(0)}, v50, fine, tool0;\nIF di1 = 1 MoveL {abb(1)}, v50, fine, tool0;\n", 2),
+    "IF of two lines": (".mod", f"IF di1 = 1 ! then; go\n  MoveL {abb(1)}, v50, fine, tool0;\n", 2),
+    "IF of a point": (".mod", f"IF a MoveL p9, v50, fine, tool0;\nCONST robtarget p9 := {abb(1)};\n", 1),
+    "after another": (".mod", f"Set do1; MoveL {abb(1)}, v50, fine, tool0;\n", 1),
+    "if": (".script", f"if a: movel({ur(0)}) end\n", 1),
     "ArcCStart": (".mod", f"ArcCStart p1, {abb(2)}, v50, sm1, wd1, fine, tool0;\n", 1),
 }
 
@@ -257,6 +262,13 @@ def test_no_overshoot_is_inserted_into_an_arc_or_a_spline(suffix, text, line):
     assert corrected(text, suffix).names
     with pytest.raises(DataError, match=rf"line {line}: no overshoot point can stand before a move .*--approach"):
         corrected(text, suffix, approach=1)
+
+
+def test_overshoots_stand_within_the_branch_of_an_if():
+    move = f"  MoveL {abb(0)}, v50, fine, tool0;\n"
+    text = f"IF di1 = 1 THEN\n{move}ELSEIF di2 = 1 THEN\n{move}ELSE\n{move}ENDIF\n! only if\n{move}"
+    added = corrected(text, ".mod", approach=1).text.splitlines()
+    assert [k for k, line in enumerate(added) if "MoveAbsJ" in line] == [1, 4, 7, 11]
 
 
 def test_overshoots_stand_before_lines_beside_a_spline():
