@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from acquisition.recording import Samples
 from acquisition.recording.rig import Rig
 from calibrate.diagnose.session import Session
-from calibrate.effects.drivers import Drivers, Readout, conditions_of, temperatures_of, uncoupled_samples
+from calibrate.effects.drivers import Drivers, Readout, conditions_of, uncoupled_samples
 from calibrate.sensors.model import Standing, Used
 from calibrate.weighting import Measured
 
@@ -23,7 +23,7 @@ def drivers_of(session: Session, frames: Floats, expected: Mapping[str, Floats],
     parameters.
     """
     readouts = {m.name: _readout(m, expected[m.name], own[m.name], frames) for m in session.measured}
-    return drivers_at(session.rig, session.samples, frames, readouts, temperatures_of(session.samples))
+    return Drivers(**vars(session.conditions), rig=session.rig, frames=frames, readouts=readouts)
 
 
 def drivers_at(

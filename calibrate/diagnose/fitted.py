@@ -189,19 +189,27 @@ class Fitted:
 
         A search asks for thousands: where a row follows one sample alone, by what each direction of the port does.
         """
-        measured, problem, drivers = self.session.measured, self.problem, self.drivers
-        if problem.shared is not None or any(m.sample_rows.shape[1] > 1 for m in measured):
+        problem, drivers, samples = self.problem, self.drivers, self._followed
+        if samples is None:
             return problem.whitened(problem.columns(term.port, term.basis(drivers, inner), self.around))
-        samples = [m.sample_rows[rows, 0] for m, rows in zip(measured, problem.rows, strict=True)]
-        if not isinstance(term, Form) or term.directions is None:
+        directions = term.along(drivers) if isinstance(term, Form) else None
+        if not isinstance(term, Form) or directions is None:
             basis = term.basis(drivers, inner)
             levers = self._lever(term.port, np.eye(basis.shape[1]))
             return [lever @ basis[sample] for lever, sample in zip(levers, samples, strict=True)]
-        values, levers = self.listed.function(term, inner), self._lever(term.port, term.directions)
+        values, levers = self.listed.function(term, inner), self._lever(term.port, directions)
         return [
             (lever[:, :, None, :] * values[sample][:, None, :, None]).reshape(*lever.shape[:2], -1)
             for lever, sample in zip(levers, samples, strict=True)
         ]
+
+    @cached_property
+    def _followed(self) -> list[Ints] | None:
+        """Of each instrument (active row,) the sample that it follows; None where one follows several."""
+        measured = self.session.measured
+        if self.problem.shared is not None or any(m.sample_rows.shape[1] > 1 for m in measured):
+            return None
+        return [m.sample_rows[rows, 0] for m, rows in zip(measured, self.problem.rows, strict=True)]
 
     def _lever(self, port: Port, directions: Floats) -> list[Floats]:
         """Of each instrument (active row, k, d) whitened, what directions (width, d) of a port do."""

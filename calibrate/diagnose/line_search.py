@@ -36,38 +36,57 @@ def refined(bench: Bench, term: Term, inner: Floats, without: Removed | None = N
 
 def solved(bench: Bench, term: Term, inner: Floats, without: Removed | None = None) -> tuple[Floats, float]:
     """(coefficient,) with everything else refitted, and what they explain of the residual's square."""
-    columns = bench.state.columns(term, inner)
-    size = np.linalg.norm(columns, axis=0)
-    unit = (columns / np.where(size > 0.0, size, 1.0)).T
-    seen = bench.sight.complement(unit)
-    gram, along = seen @ seen.T, seen @ bench.sight.residual
+    found, squares = _solved(bench, term, [inner], without)
+    return found[0], float(squares[0])
+
+
+def _solved(bench: Bench, term: Term, inner: Sequence[Floats], without: Removed | None) -> tuple[Floats, Floats]:
+    """(value, coefficient) and (value,) of several inner values at once."""
+    columns = np.stack([bench.state.columns(term, one).T for one in inner])
+    size = np.linalg.norm(columns, axis=2)
+    size = np.where(size > 0.0, size, 1.0)
+    unit = columns / size[:, :, None]
+    flat = unit.reshape(-1, unit.shape[2])
+
+    def through(basis: Floats) -> Floats:
+        return (flat @ basis).reshape(*unit.shape[:2], -1)
+
+    absorbed, along = through(bench.sight.basis), through(bench.sight.residual)
+    gram = unit @ np.swapaxes(unit, 1, 2) - absorbed @ np.swapaxes(absorbed, 1, 2)
     if without is not None:
-        back = unit @ without.span
-        gram, along = gram + back @ back.T, along + back @ without.part
+        back = through(without.span)
+        gram, along = gram + back @ np.swapaxes(back, 1, 2), along + back @ without.part[:, None]
     w, V = np.linalg.eigh(gram)
-    turned = np.where(w > VISIBLE, V.T @ along, 0.0)
-    found = V @ (turned / np.maximum(w, VISIBLE))
-    return found / np.where(size > 0.0, size, 1.0), float(np.sum(turned**2 / np.maximum(w, VISIBLE)))
+    turned = np.where(w > VISIBLE, (np.swapaxes(V, 1, 2) @ along)[..., 0], 0.0)
+    found = (V @ (turned / np.maximum(w, VISIBLE))[..., None])[..., 0]
+    return found / size, np.sum(turned**2 / np.maximum(w, VISIBLE), axis=1)
 
 
-def _explains(bench: Bench, term: Term, inner: Floats, j: int, without: Removed | None) -> Callable[[float], float]:
-    def squares(value: float) -> float:
-        trial = inner.copy()
-        trial[j] = value
-        return solved(bench, term, trial, without)[1]
+def _explains(
+    bench: Bench, term: Term, inner: Floats, j: int, without: Removed | None
+) -> Callable[[Sequence[float]], Floats]:
+    """Of values (value,) of one inner parameter what they explain."""
+
+    def squares(values: Sequence[float]) -> Floats:
+        trials = np.tile(inner, (len(values), 1))
+        trials[:, j] = values
+        return _solved(bench, term, list(trials), without)[1]
 
     return squares
 
 
 def telling_times(bench: Bench, term: Term, inner: Floats) -> Floats:
-    """(time,) of the samples that can show when a step was: those that would feel it, had it always been there."""
+    """(time,) of the samples that can show when a step was: those of the fit that would feel it, had it always been
+    there.
+    """
     ends = np.where([spec.later for spec in term.inner], np.inf, -np.inf)
     always = np.where([spec.discrete for spec in term.inner], ends, inner)
     felt = np.any(term.basis(bench.state.drivers, always) != 0.0, axis=(1, 2))
-    return np.unique(bench.state.drivers.t_s[felt])
+    seen = np.unique(bench.state.rows.sample[bench.state.rows.data])
+    return np.unique(bench.state.drivers.t_s[seen[felt[seen]]])
 
 
-def _best_of_one(squares: Callable[[float], float], spec: Inner, value: float, times: Floats) -> float:
+def _best_of_one(squares: Callable[[Sequence[float]], Floats], spec: Inner, value: float, times: Floats) -> float:
     """Between the neighbours of a value on the grid; a step between two of the `times` that can show it."""
     grid = np.array([spec.lower, *spec.grid, spec.upper])
     below, above = grid[grid < value], grid[grid > value]
@@ -78,14 +97,14 @@ def _best_of_one(squares: Callable[[float], float], spec: Inner, value: float, t
         return _best_of(squares, [value, *_between(times, low, high)])
 
     def left(x: float) -> float:
-        return -squares(x)
+        return -float(squares([x])[0])
 
     found = minimize_scalar(left, bounds=(low, high), method="bounded", options={"xatol": FINE * (high - low)})
     return _best_of(squares, [value, float(found.x)])
 
 
-def _best_of(squares: Callable[[float], float], values: Sequence[float]) -> float:
-    return max(values, key=squares)
+def _best_of(squares: Callable[[Sequence[float]], Floats], values: Sequence[float]) -> float:
+    return values[int(np.argmax(squares(values)))]
 
 
 def _between(times: Floats, low: float, high: float) -> list[float]:

@@ -39,7 +39,9 @@ class Null:
         if not slow:
             return min(1.0, FAMILIES * self.fast.p(gain))
         if self.law.wanders:
-            gain = float(_beyond_wander(self.law, sight.residual[:, None], span, cost, sight.data)[0])
+            left = sight.residual[:, None]
+            after = left - span.T @ (span @ left)
+            gain = float(_beyond_wander(self.law, left, after, np.array([cost]), sight.data)[0])
         return self._of_slow(gain)
 
     def p_of_worth(self, slow: bool, sight: Sight, gone: Removed) -> float:
@@ -96,15 +98,16 @@ def _slow_maxima(menu: Menu, law: NoiseLaw, left: Floats, gains: Floats, slow: B
         return np.zeros(0)
     if not law.wanders:
         return np.max(gains[slow], axis=0)
-    best, out = np.flatnonzero(slow)[np.argmax(gains[slow], axis=0)], np.zeros(left.shape[1])
+    best, after, cost = np.flatnonzero(slow)[np.argmax(gains[slow], axis=0)], left.copy(), np.zeros(left.shape[1])
     for entry in np.unique(best):
         span, mine = directions(menu, int(entry)), best == entry
-        cost = len(span) + int(menu.numbers[entry])
-        out[mine] = _beyond_wander(law, left[:, mine], span, cost, menu.sight.data)
-    return out
+        after[:, mine] -= span.T @ (span @ left[:, mine])
+        cost[mine] = len(span) + menu.numbers[entry]
+    return _beyond_wander(law, left, after, cost, menu.sight.data)
 
 
-def _beyond_wander(law: NoiseLaw, left: Floats, span: Floats, cost: int, data: int) -> Floats:
-    """(draw,) BIC gain of directions (k, row) if noise (row, draw) wanders, as fits best with them and without."""
-    after = left - span.T @ (span @ left)
+def _beyond_wander(law: NoiseLaw, left: Floats, after: Floats, cost: Floats, data: int) -> Floats:
+    """(draw,) BIC gain if noise (row, draw) wanders as fits best with and without directions; `after` is what these
+    leave of it, `cost` (draw,) parameters are paid for.
+    """
     return law.gain(left, after) - cost * float(np.log(data))

@@ -116,7 +116,6 @@ def processes(bench: Bench, places: Sequence[tuple[Port, int]], drivers: int) ->
     causes, waves = causes_of(bench.state.drivers), WAVES[drivers]
     names = [c for c in combinations(causes, drivers) if drivers == 1 or _may_pair(c)]
     wanted = [(place, c) for place in places for c in names if all(acts_at(name, place[0].where) for name in c)]
-    used = [place for place in places if any(place == p for p, _ in wanted)]
     curves = tuple(curve(port, component, c, waves) for (port, component), c in wanted)
     basis = bench.sight.basis
     if not curves:
@@ -125,9 +124,12 @@ def processes(bench: Bench, places: Sequence[tuple[Port, int]], drivers: int) ->
             return np.zeros((0, 1, columns.shape[1]))
 
         return Processes((), np.zeros((0, 1, 1)), nothing(basis), nothing, basis, bench.sight.data)
-    shapes = np.stack([features([causes[n] for n in c], waves).T for c in names])
-    asked = {place: np.array([names.index(c) for p, c in wanted if p == place]) for place in used}
-    felt = [_Felt.of(bench, place, shapes, asked[place]) for place in used]
+    # In one piece, since products reshape them often.
+    shapes = np.ascontiguousarray([features([causes[n] for n in c], waves).T for c in names])
+    asked: dict[tuple[Port, int], list[int]] = {}
+    for place, c in wanted:
+        asked.setdefault(place, []).append(names.index(c))
+    felt = [_Felt.of(bench, place, shapes, np.array(mine)) for place, mine in asked.items()]
 
     def products(columns: Floats) -> Floats:
         return np.concatenate([one.products(columns) for one in felt])

@@ -17,6 +17,7 @@ from calibrate.arms.belief import LinkBelief
 from calibrate.arms.catalogue import arm_of
 from calibrate.arms.serial import SerialArm
 from calibrate.default_belief import PAIR, SCALELESS, WIDE
+from calibrate.effects.drivers import Conditions, conditions_of, temperatures_of, uncoupled_samples
 from calibrate.instruments import instruments_of
 from calibrate.parameters import Parameter
 from calibrate.sensors.catalogue import SENSORS, names_with
@@ -43,6 +44,11 @@ class Session:
     @property
     def measured(self) -> tuple[Measured, ...]:
         return self.weighting.measured
+
+    @cached_property
+    def conditions(self) -> Conditions:
+        """That its samples were taken under."""
+        return conditions_of(uncoupled_samples(self.rig.arm, self.samples), temperatures_of(self.samples))
 
     @cached_property
     def parameters(self) -> tuple[Parameter, ...]:

@@ -6,6 +6,7 @@ Drivers come from the record or from the model, never from what was measured: a 
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TypeVar
 
 import numpy as np
@@ -219,6 +220,13 @@ class Drivers(Conditions):
     def of_session(self, values: Values) -> Values:
         """Those of values (pose, ...) that means, largest values and ranges are taken of."""
         return values[: self.session_rows]
+
+    @cached_property
+    def about_middle(self) -> Floats:
+        """(6, 6) shifts, and turns about the middle of what the flange reached, as motions about the base's origin."""
+        out = np.eye(6)
+        out[:3, 3:] = np.cross(self.of_session(self.frames)[:, -1, :3, 3].mean(axis=0), np.eye(3)).T
+        return out
 
     def having(self, trait: Trait) -> tuple[str, ...]:
         """Names of the instruments of the session that have it, in the order of the catalogue."""

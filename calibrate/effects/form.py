@@ -30,16 +30,21 @@ class Form(Term):
     sentence: str = field(kw_only=True)  # with {name} for sizes, in the units of `names`
     reversed_sentence: str = field(kw_only=True, default="")  # where the first size is below zero, of its opposite
     directions: Floats | None = field(kw_only=True, default=None)  # (width, d); None: the function has its own
+    about: Callable[[Drivers], Floats] | None = field(kw_only=True, default=None)  # directions that follow the session
     polar: bool = field(kw_only=True, default=False)  # coefficients are (sine, cosine): reported as amplitude, phase
     exact: Exact | None = field(kw_only=True, default=None)  # where `function` is the first order only
     believable: Believable | None = field(kw_only=True, default=None)  # what is more than a limit of size
 
     def basis(self, drivers: Drivers, inner: Floats) -> Floats:
-        values = self.function(drivers, inner)
-        if self.directions is None:
+        values, directions = self.function(drivers, inner), self.along(drivers)
+        if directions is None:
             return values
-        product = np.einsum("nm,wd->nwmd", values, self.directions)
-        return product.reshape(len(values), len(self.directions), -1)
+        product = np.einsum("nm,wd->nwmd", values, directions)
+        return product.reshape(len(values), len(directions), -1)
+
+    def along(self, drivers: Drivers) -> Floats | None:
+        """(width, d) directions of the port; None where the function has its own at each pose."""
+        return self.directions if self.about is None else self.about(drivers)
 
     def amount(self, drivers: Drivers, coefficients: Floats, inner: Floats) -> Floats:
         if self.exact is None:

@@ -69,12 +69,7 @@ def motion(
     sizes = [", ".join(f"{{{name}}}" for name in names[k : k + 3]) for k in (0, 3)]
 
     def function(drivers: Drivers, values: Floats) -> Floats:
-        amount = law(drivers, values) * (1.0 if among is None else among(drivers, values))
-        directions = np.eye(6)[:, :width]
-        middle = drivers.of_session(drivers.frames)[:, -1, :3, 3].mean(axis=0)
-        if width == 6:
-            directions[:3, 3:] = np.cross(middle, np.eye(3)).T
-        return amount[:, :, None] * directions
+        return law(drivers, values) * (1.0 if among is None else among(drivers, values))
 
     return Form(
         Port(where, Place.SURROUNDINGS),
@@ -87,6 +82,7 @@ def motion(
         variant=variant,
         open=open_family,
         function=function,
+        about=lambda drivers: drivers.about_middle[:, :width],
         names=names,
         limit=LIMIT,
         sentence=f"{what} moved by {sizes[0]} in x, y, z of the base"

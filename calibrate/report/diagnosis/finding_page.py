@@ -4,9 +4,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.patches import FancyBboxPatch
 from numpy.typing import NDArray
 
 from calibrate.diagnose.schema import CurveRecord, DiagnosisFile, FindingRecord, RivalRecord, SizeRecord
@@ -14,7 +12,7 @@ from calibrate.report.diagnosis.words import place_words, unit_of
 from calibrate.report.elements import Html, facts, figure, panels, section, table, tag
 from calibrate.report.error_figures import thinned
 from calibrate.report.quantities import DASH, TIED, decimals_of, fixed, significant
-from calibrate.report.svg import drawn
+from calibrate.report.svg import POINT_PX, drawn
 from calibrate.report.tones import Tone
 from calibrate.sensors.catalogue import kind_of
 from calibrate.sensors.kind import Trait
@@ -44,44 +42,53 @@ def chain_of(joints: int, instruments: Sequence[str]) -> tuple[Link, ...]:
     return tuple(out)
 
 
+BOX_PT = (45.0, 30.0)  # of a link
+ROW_PT = 44.0
+WIDE_PT = 345.6  # 4.8 in, as the other figures of a panel
+
+
 def chain_figure(name: str, where: str, chain: Sequence[Link]) -> Html:
-    """With the link of the port `where` marked."""
+    """With the link of the port `where` marked; written here, since a page has one of every finding."""
+    per_row = _per_row(len(chain))
+    rows, step = -(-len(chain) // per_row), WIDE_PT / per_row
+    parts: list[Html] = []
+    for at, link in enumerate(chain):
+        x, y = (at % per_row + 0.5) * step, (at // per_row + 0.5) * ROW_PT
+        marked = any(where.startswith(port) for port in link.ports)
+        parts += _box(x, y, link.name, where.partition(".")[2] if marked else "")
+        if at + 1 < len(chain):
+            half = BOX_PT[0] / 2.0
+            last = at % per_row == per_row - 1
+            parts.append(
+                _line(x, y + BOX_PT[1] / 2.0, 0.0, 4.0) if last else _line(x + half, y, step - 2.0 * half, 0.0)
+            )
+    size = f"0 0 {WIDE_PT} {rows * ROW_PT}"
     says = f"the chain from base to reading, {where} marked"
-    rows = -(-len(chain) // _per_row(len(chain)))
-    return drawn(f"chain-{name}", says, 4.8, 0.25 + 0.62 * rows, lambda figure: _paint_chain(figure, where, chain))
+    style = f"max-width: {WIDE_PT * POINT_PX:.0f}px"
+    return tag("svg", *parts, id=f"chain-{name}", viewBox=size, role="img", aria_label=says, style=style)
 
 
 def _per_row(links: int) -> int:
     return -(-links // (-(-links // 6)))
 
 
-def _paint_chain(figure: Figure, where: str, chain: Sequence[Link]) -> None:
-    axes = figure.add_subplot()
-    axes.set_axis_off()
-    per_row = _per_row(len(chain))
-    for at, link in enumerate(chain):
-        row, column = divmod(at, per_row)
-        marked = any(where.startswith(port) for port in link.ports)
-        _box(axes, column, -row, link.name, where.partition(".")[2] if marked else None)
-        if at + 1 < len(chain):
-            last = column == per_row - 1
-            start, end = ((column + 0.44, -row), (column + 0.56, -row)) if not last else ((column, -row - 0.3), None)
-            if end is not None:
-                axes.plot([start[0], end[0]], [start[1], end[1]], color=Tone.SOFT.value, lw=1.2)
-    rows = -(-len(chain) // per_row)
-    axes.set(xlim=(-0.55, per_row - 0.45), ylim=(-rows + 0.5, 0.5))
+def _box(x: float, y: float, name: str, port: str) -> list[Html]:
+    tone, width = (Tone.BEAM, "2.2") if port else (Tone.SOFT, "0.8")
+    at = {"x": f"{x - BOX_PT[0] / 2.0:.1f}", "y": f"{y - BOX_PT[1] / 2.0:.1f}"}
+    size = {"width": f"{BOX_PT[0]}", "height": f"{BOX_PT[1]}", "rx": "5"}
+    colour = Tone.BEAM if port else Tone.INK
+    out = [tag("rect", **at, **size, fill="none", stroke=tone.css, stroke_width=width)]
+    out.append(_text(x, y - (5.5 if port else 0.0), name, colour))
+    return [*out, _text(x, y + 7.0, port, colour)] if port else out
 
 
-def _box(axes: Axes, x: float, y: float, name: str, port: str | None) -> None:
-    edge, width = (Tone.BEAM.value, 2.2) if port is not None else (Tone.SOFT.value, 0.8)
-    shape = FancyBboxPatch(
-        (x - 0.41, y - 0.26), 0.82, 0.52, boxstyle="round,pad=0.02,rounding_size=0.08", fc="none", ec=edge, lw=width
-    )
-    axes.add_patch(shape)
-    colour = Tone.BEAM.value if port is not None else Tone.INK.value
-    axes.text(x, y + (0.09 if port else 0.0), name, ha="center", va="center", fontsize=10, color=colour)
-    if port:
-        axes.text(x, y - 0.12, port, ha="center", va="center", fontsize=10, color=colour)
+def _text(x: float, y: float, says: str, tone: Tone) -> Html:
+    font = {"font_family": "var(--sans)", "font_size": "10", "text_anchor": "middle", "dominant_baseline": "central"}
+    return tag("text", says, x=f"{x:.1f}", y=f"{y:.1f}", fill=tone.css, **font)
+
+
+def _line(x: float, y: float, right: float, down: float) -> Html:
+    return tag("path", d=f"M{x:.1f} {y:.1f}l{right:.1f} {down:.1f}", stroke=Tone.SOFT.css, stroke_width="1.2")
 
 
 Floats = NDArray[np.float64]
