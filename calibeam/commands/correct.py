@@ -157,8 +157,9 @@ class _Job:
         return cls(known, rig.n_joints, near_rad, _conditions(condition), None, MotionInverse(RigArm.of_rig(rig)))
 
 
-# Names, frames and their names, how many are left alone, notes.
-Done = tuple[Corrected, list[str], Floats, list[str], int, tuple[str, ...]]
+Done = tuple[
+    Corrected, list[str], Floats, list[str], int, tuple[str, ...]
+]  # names, frames, theirs, how many left, notes
 
 
 def _frame(console: Console, job: _Job, given: tuple[str, ...], points: Path | None, options: Options) -> Floats | None:
@@ -225,7 +226,7 @@ def _program(console: Console, job: _Job, poses: Path, out: Path, options: Optio
 
     names = [of_file(name) for name in done.names]
     _print_program(console, done.diff, done.found, names, verbose)
-    notes = [of_file(sentence) for sentence in (*done.skipped, *done.seams)]
+    notes = [of_file(sentence) for sentence in (*done.skipped, *done.warnings)]
     if done.kept:
         notes.append(f"{len(done.kept)} joint targets kept as they are ({', '.join(done.kept[:3])}): --joint-targets")
     called = [of_file(name) for name in done.frame_names]

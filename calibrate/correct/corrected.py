@@ -137,7 +137,7 @@ class Corrected:
         """
         keys, out = _alike(frames), list[FrameError]()
         keys[np.array([not name for name in names])] = -1
-        held_m = _held(keys, self.T_base_tool[:, :3, 3], self.before.shift_m)
+        held_m = taken_up(keys, self.T_base_tool[:, :3, 3], self.before.shift_m)
         for key in dict.fromkeys(keys[np.isfinite(held_m) & (keys >= 0)].tolist()):
             rows = keys == key
             again_m = self.after.rms_where(rows)
@@ -354,17 +354,13 @@ def _solved(
     return best_rad, found & np.isfinite(least)
 
 
-def taken_up(frames: Floats, goal_m: Floats, shift_m: Floats) -> Floats:
-    """(pose,) m that frames (pose, 4, 4) hold of shifts (pose, 3), wanted less reached, at their poses (pose, 3)."""
-    return _held(_alike(frames), goal_m, shift_m)
-
-
 def _alike(frames: Floats) -> NDArray[np.intp]:
     """(pose,) the same number for the same frame (pose, 4, 4)."""
     return np.unique(np.round(frames, SAME).reshape(len(frames), -1), axis=0, return_inverse=True)[1].ravel()
 
 
-def _held(keys: NDArray[np.intp], goal_m: Floats, shift_m: Floats) -> Floats:
+def taken_up(keys: NDArray[np.intp], goal_m: Floats, shift_m: Floats) -> Floats:
+    """(pose,) m that frames, numbered (pose,), hold of shifts (pose, 3), wanted less reached, at poses (pose, 3)."""
     out = np.full(len(goal_m), np.nan)
     for key in np.unique(keys):
         rows = np.flatnonzero((keys == key) & np.isfinite(shift_m).all(axis=1))

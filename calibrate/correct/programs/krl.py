@@ -61,6 +61,14 @@ CHANGED = re.compile(r"(?<![\w$.])(?P<name>\$?\w+(?:[ \t]*\[[^\]\n]*\])?)(?:\.\w
 CHOSEN = re.compile(r"\[(?!\d+\])")  # an index that is no number
 INLINE_FORM = re.compile(r"S(?:BASE|TOOL2?)\s*\(\s*(?P<name>\w+)\s*\)\s*", re.IGNORECASE)
 FIXED = re.compile(r"\$IPO_MODE\s*=\s*#TCP|IPO_FRAME\s+#TCP", re.IGNORECASE)
+CALLED = re.compile(r"(?:^|\bDO)[ \t]*(?P<name>[A-Z]\w*)[ \t]*\(", LINES)
+# Statements, and subprograms of the system that leave bases and tools as they are, or are followed (BAS).
+BUILT_IN = literal.built_in(r"""
+    S?(?:PTP|LIN|CIRC)(?:_REL)? SPL IF WHILE UNTIL SWITCH CASE FOR RETURN WAIT BAS IR_STOPM P00 CHK_HOME
+    C(?:OPEN|CLOSE|READ|WRITE|IOCTL) S(?:READ|WRITE) IOCTL CAST_(?:TO|FROM) PULSE ROB_STOP(?:_RELEASE)? VARSTATE
+    SET_BRAKE_DELAY DELETE_BACKWARD_BUFFER SUPPRESS_REPOSITIONING VECTORMOVEO(?:N|FF) (?:RE)?SET_TORQUE_LIMITS
+    WSPACE(?:GIVE|TAKE) SYNCCMD REMOTE(?:CMD|READ) CANCELPROGSYNC MBX_REC (?:SET|CLEAR|EXISTS)_KRL(?:MSG|DLG)\w*
+    MSG(?:NOTIF|NOTIFY|QUIT|STATE|DIALOG|LOOP) ERR_(?:RAISE|CLEAR) EKI_\w+ RSI_\w+ EB_TEST EO STR(?:ADD|CLEAR|COPY)""")
 POSE = ("X", "Y", "Z", "A", "B", "C")
 
 
@@ -91,7 +99,8 @@ def find(text: str, n_joints: int) -> literal.Targets:
             literals.append(one)
     others = ((m.end(), f"{m.group().strip()}: relative moves are not corrected") for m in OTHER.finditer(code))
     skipped += literal.sentences(code, by_name, literals, CHANGED, others)
-    return literal.Targets(tuple(sorted(literals, key=lambda one: one.at)), tuple(skipped))
+    absent = literal.absent(code, CALLED.finditer(code), ROUTINE, BUILT_IN, "sets $BASE or $TOOL")
+    return literal.Targets(tuple(sorted(literals, key=lambda one: one.at)), tuple(skipped), absent)
 
 
 def _literal(

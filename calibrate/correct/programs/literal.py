@@ -17,6 +17,7 @@ from calibrate.errors import DataError
 
 Floats = NDArray[np.float64]
 Span = tuple[int, int]
+Notes = tuple[str, ...]
 T = TypeVar("T")
 
 UNIT = 1e-2  # by which the length of a quaternion may differ from 1: rounding of two decimals
@@ -82,6 +83,7 @@ class Targets:
 
     literals: tuple[Literal, ...]
     skipped: tuple[str, ...]
+    absent: tuple[str, ...] = ()  # sentences about routines that are called and are not in the file
 
 
 @dataclass(frozen=True)
@@ -152,6 +154,22 @@ def last_before(states: Sequence[T], starts: Sequence[int], at: int, otherwise: 
     """The state since the last of the ascending `starts` before a place."""
     k = bisect_left(starts, at)
     return states[k - 1] if k else otherwise
+
+
+def built_in(names: str) -> re.Pattern[str]:
+    """Of names, or patterns of them, between spaces."""
+    return re.compile("|".join(names.split()), re.IGNORECASE)
+
+
+def absent(code: str, calls: Iterable[re.Match[str]], held: re.Pattern[str], own: re.Pattern[str], sets: str) -> Notes:
+    """On each routine that is neither `held` by the file nor the controller's `own`, where it is called first."""
+    names, first = {match["name"].lower() for match in held.finditer(code)}, dict[str, str]()
+    for match in calls:
+        name, line = match["name"], line_of(code, match.start("name"))
+        if name.lower() not in names and not own.fullmatch(name):
+            says = f"line {line}: {name} is not in this file: if it {sets}, the targets after it are wrong"
+            first.setdefault(name.lower(), says)
+    return tuple(first.values())
 
 
 def line_start(text: str, at: int) -> int:

@@ -6,7 +6,7 @@ cf1, cf4 and cf6 are the quarter turns in which axes 1, 4 and 6 stand, 0 from 0 
 
 import re
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,6 +51,32 @@ ARC = rf"{ROUND}(?:{NAME}(?:\((?:[^();]|\([^();]*\))*\))?|{ROBTARGET.replace('?P
 ARC_END = re.compile(rf"{ARC}(?P<target>\[|{NAME})", re.IGNORECASE)
 INLINE = re.compile(rf"(?:{INSTRUCTION}|{ARC})$", re.IGNORECASE)
 REST = re.compile(r"\bMove\w+\s+(?:\[.*\]\]|\w+)\s*(?P<rest>(?:\\[^,]*)?,.*;)", re.IGNORECASE)
+ROUTINE = re.compile(r"\b(?:PROC|RECORD)\s+(?P<name>\w+)", re.IGNORECASE)
+# Behind the condition of an IF without THEN comes what is no operand any more.
+IF = r"\bIF\b[^;\n]{0,99}?(?<=[\w)}])(?<!\bAND|\bXOR|\bNOT|\bDIV|\bMOD)(?<!\bOR|\bIF)\s+(?!(?:AND|X?OR|DIV|MOD|THEN)\b)"
+CALLED = re.compile(
+    rf"(?:^|;|\bTHEN\b|\bELSE\b|\bDO\b|{IF})[ \t]*(?!IF\b)(?P<name>[A-Z]\w*)(?=[ \t]*[;\\]|[ \t]+[\w\[(,-])",
+    re.IGNORECASE | re.MULTILINE,
+)
+BUILT_IN = literal.built_in(rf"""
+    IF ELSE ELSEIF END(?:IF|FOR|WHILE|TEST|PROC|FUNC|TRAP|RECORD|MODULE) FOR WHILE TEST CASE RETURN GOTO CONNECT RAISE
+    RETRY TRYNEXT EXIT(?:CYCLE)? VAR PERS CONST LOCAL TASK PROC FUNC TRAP RECORD MODULE ALIAS ERROR UNDO BACKWARD d?num
+    bool string pos orient pose robtarget jointtarget Move(?:AbsJ|ExtJ|[JLC](?:[ADG]O|Sync)?) Search(?:[JLC]|ExtJ)
+    {PROCESS} SpotM[JL] Calib[JL] ArcRefresh Trigg(?:IO|Int|Equip|CheckIO|RampAO|Speed|StopProc|AbsJ|Data\w+)
+    (?:Start|Stop)Move(?:Retry|Reset)? (?:Clear|Store|Resto|StepBwd)Path PathResol PathRec\w+ PathAccLim CirPathMode
+    Conf[JL] SingArea AccSet VelSet Speed(?:Refresh|Lim\w+) WorldAccLim GripLoad MechUnitLoad Soft(?:Act|Deact|Elbow)
+    (?:De)?Act(?:Unit|EventBuffer) SyncMove\w+ SyncToSensor SupSyncSensor\w+ (?:PDisp|EOffs)(?:On|Off|Set)
+    Tune(?:Servo|Reset) Ind(?:[ACDR]Move|Reset) Corr(?:Con|Discon|Write|Clear) MotionSup MotionProcessModeSet CollDetect
+    [MS]Tool\w+Calib ST(?:Calib|Close|Open|(?:Tune|IndGun)(?:Reset)?) SetForce (?:Set|Wait|ISignal)[ADG][IO] Set Reset
+    PulseDO InvertDO Wait(?:Until|Time|Load|Rob|Sensor|SyncTask|TestAndSet|WObj) DropWObj AliasIO(?:Reset)?
+    IO(?:Disable|Enable|Bus\w+) Set(?:AllDataVal|DataSearch|LeadThrough|upCyclicBool) [GS]et(?:DataVal|SysData)
+    (?:Start|Un|Cancel)?Load EraseModule CheckProgRef Save(?:CfgData)? Stop Break CallByVar SystemStopAction RaiseToUser
+    Err(?:Raise|Log|Write) SkipWarn ResetRetryCount ProcerrRecovery
+    I(?:Delete|Timer|Sleep|Watch|Enable|Disable|Error|Pers|RMQMessage|VarValue) Add Clear Decr Incr
+    Clk(?:Reset|Start|Stop) Bit(?:Clear|Set) \w+RawBytes PackDNHeader (?:Read|Write)(?:AnyBin|Block|CfgData|Var)
+    Write(?:Bin|StrBin)? TextTabInstall WZ\w+ TP(?:Erase|Write|Show|Read\w+) UI(?:Show|Msg\w+) Open(?:Dir)?
+    Close(?:Dir)? Rewind ClearIOBuff (?:Make|Remove)Dir (?:Copy|Remove|Rename)File Socket\w+ RMQ\w+ Spy(?:Start|Stop)
+    TestSign\w+ WarmStart EGM\w+ Cam[A-Z]\w+""")
 LONGEST = 400  # letters between the beginning of a move and its last target
 QUARTER = np.pi / 2.0
 CF = ((0, 0), (1, 3), (2, 5))  # entry of confdata, joint from 0
@@ -77,7 +103,15 @@ def find(text: str, n_joints: int) -> literal.Targets:
         return literal.Targets((), (why, *skipped))
     if n_joints != 6:
         return literal.Targets((), (*skipped, f"RAPID targets have six axes, this arm has {n_joints}"))
-    return literal.Targets(tuple(literals), skipped)
+    what = "displaces the program, or changes a work object or a tool"
+    return literal.Targets(tuple(literals), skipped, literal.absent(code, _calls(code), ROUTINE, BUILT_IN, what))
+
+
+def _calls(code: str) -> Iterator[re.Match[str]]:
+    """Statements that are a name, with or without arguments; no lines that go on with one."""
+    for match in CALLED.finditer(code):
+        if not code[max(0, match.start() - LONGEST) : match.start("name")].rstrip().endswith(tuple(",+-*/=<>([{\\")):
+            yield match
 
 
 def _declared(code: str, match: re.Match[str]) -> list[tuple[int, str]]:

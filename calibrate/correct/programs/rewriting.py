@@ -55,8 +55,9 @@ class CorrectedProgram:
     """`diff` unified, line by line; `names` of the targets, one a row of `found`, and of their frames, empty for joint
     targets; `frames` (target, 4, 4) in the base.
 
-    `skipped`: sentences on the others; `kept`: names of joint targets, which stay; `seams`: sentences on moves along a
-    line from a target that is corrected to one that is not, or the reverse.
+    `skipped`: sentences on the others; `kept`: names of joint targets, which stay; `warnings`: sentences on
+    routines that are not in the file, and on moves along a line from a target that is corrected to one that is not, or
+    the reverse.
     """
 
     text: str
@@ -67,7 +68,7 @@ class CorrectedProgram:
     found: Corrected
     skipped: tuple[str, ...]
     kept: tuple[str, ...]
-    seams: tuple[str, ...]
+    warnings: tuple[str, ...]
     pieces: tuple[tuple[int, int, str], ...]  # from, to in the text that was given, and what stands there now
 
     def placed(self, at: int) -> int:
@@ -135,8 +136,8 @@ def correct_program(
     new = _replaced(text, pieces)
     changes = difflib.unified_diff(text.splitlines(), new.splitlines(), name, "corrected", lineterm="", n=0)
     found = replace(found, q_rad=q_rad, after=after)
-    seams = _seams(text, targets, [bool(np.isfinite(joints).all()) for joints in q_rad])
-    return CorrectedProgram(new, tuple(changes), *names, base, found, targets.skipped, kept, seams, tuple(pieces))
+    warnings = (*targets.absent, *_seams(text, targets, [bool(np.isfinite(joints).all()) for joints in q_rad]))
+    return CorrectedProgram(new, tuple(changes), *names, base, found, targets.skipped, kept, warnings, tuple(pieces))
 
 
 def _named(literals: Sequence[Literal], options: Options) -> tuple[tuple[tuple[str, ...], tuple[str, ...]], Options]:

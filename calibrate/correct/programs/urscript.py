@@ -10,7 +10,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from calibrate.correct.programs import literal
-from calibrate.correct.programs.stated_frames import Event, routines_of, set_above, words_of
+from calibrate.correct.programs.stated_frames import CALL, Event, routines_of, set_above, words_of
 from calibrate.correct.rotations import VECTOR
 
 LIST = rf"(?P<pose>p?)\[\s*{literal.NUMBER}(?:\s*,\s*{literal.NUMBER})*\s*\]"
@@ -34,6 +34,18 @@ WAY = re.compile(
     r"(?<![\w.])(?:(?P<loop>while)|(?P<if>if)|(?P<else>elif)|(?P<otherwise>else)|(?P<end>end)|(?P<return>return)"
     r"|(?P<break>break|continue))\b"
 )
+BUILT_IN = literal.built_in(r"""
+    def thread sec if elif while return and or x?or not in run join kill assert halt sleep sync popup textmsg pause
+    (?:opti)?move[jlpc] servo[jc] speed[jl] stop[jl] a?(?:sin|cos|tan) atan2 sqrt pow log ceil floor norm length random
+    d2r r2d size inv transpose normalize make_list binary_list_to_integer integer_to_binary_list point_dist
+    (?:pose|str|get|is|read|write|socket|modbus|rtde|rpc|request|encoder|conveyor)_\w+ interpolate_pose wrench_trans
+    rotvec2rpy rpy2rotvec to_num to_str force(?:_mode\w*)? (?:freedrive|teach)_mode\w*
+    end_(?:force|freedrive|teach)_mode (?:end_)?screw_driving tool_contact\w* track_conveyor_\w+ stop_conveyor_tracking
+    path_offset_\w+ position_deviation_warning reset_revolution_counter zero_ftsensor ft_rtde_input_enable
+    power(?:down|_\w+) direct_torque enable_external_ft_sensor set_(?:standard|configurable|runstate|gp)_\w+
+    set_(?:tcp|gravity|pos|flag|(?:target_)?payload\w*|conveyor_tick_count|input_actions_to_default)
+    set_(?:tool_)?(?:voltage|output_mode|communication|(?:digital|analog)_\w+)
+    set_(?:analog\w+|safety_mode_transition_hardness|base_acceleration)""")
 TCP = re.compile(rf"\bset_tcp\s*\(\s*(?:(?P<literal>{LIST}\s*\))|(?P<words>[^\n]*))")
 
 
@@ -55,7 +67,8 @@ def find(text: str, n_joints: int) -> literal.Targets:
     unread = literal.unread(text, code, POSE, good)
     left = (one for one in unread if not any(begin <= one[0] < end for begin, end in tools))
     skipped = literal.sentences(code, by_name, good, CHANGED, left)
-    return literal.Targets(tuple(sorted(good, key=lambda one: one.at)), skipped)
+    absent = literal.absent(code, CALL.finditer(code), ROUTINE, BUILT_IN, "sets the tool (set_tcp)")
+    return literal.Targets(tuple(sorted(good, key=lambda one: one.at)), skipped, absent)
 
 
 def _places(code: str) -> literal.Places:

@@ -50,7 +50,7 @@ def test_a_taught_frame_holds_the_rigid_part_of_the_old_errors():
     rng = np.random.default_rng(1)
     goal_m = rng.uniform(-0.3, 0.3, (20, 3))
     shift_m = np.array([1e-3, 0.0, -5e-4]) + np.cross([1e-3, 2e-3, 0.0], goal_m)
-    frames = np.broadcast_to(np.eye(4), (20, 4, 4))
+    frames = np.zeros(20, dtype=int)
     np.testing.assert_allclose(taken_up(frames, goal_m, shift_m), np.linalg.norm(shift_m, axis=1), atol=1e-12)
     random_m = 1e-3 * rng.standard_normal((20, 3))
     assert np.nanmean(taken_up(frames, goal_m, random_m) ** 2) < 0.3 * np.mean(np.sum(random_m**2, axis=1))

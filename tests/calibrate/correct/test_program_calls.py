@@ -3,6 +3,7 @@
 import pytest
 
 from calibrate.correct.programs import krl, rapid, urscript
+from calibrate.correct.programs.rewriting import dialect_of
 
 POINT = "LIN {X 1, Y 0, Z 0, A 0, B 0, C 0}\n"
 
@@ -208,3 +209,88 @@ def test_the_base_of_a_spline_block_ends_with_the_block() -> None:
     header = base(2).replace("$BASE", "SPLINE WITH $BASE")
     text = f"DEF a()\n{base(1)}{header}SLIN {POSE}\nENDSPLINE\n{POINT}END\n"
     assert of_krl(text) == [2.0, 1.0]
+
+
+ABSENT = {  # text, names that are listed, and their lines
+    ".src": (
+        """EXT BAS (BAS_COMMAND :IN, REAL :IN)
+EXT GRIP ()
+DEF main()
+BAS (#INITMOV, 0)
+INTERRUPT DECL 3 WHEN $STOPMESS DO IR_STOPM ( )
+IF (k == 1) THEN
+  Grip (1)
+ENDIF
+own()
+WAIT FOR ($IN[1])
+GRIP(2) ; FOO()
+PULSE ($OUT[1], TRUE, 1)
+TRIGGER WHEN DISTANCE=0 DELAY=0 DO glue(1) PRIO=-1
+x = SIN(y)
+END
+DEF own()
+END
+""",
+        [("Grip", 7), ("glue", 13)],
+    ),
+    ".mod": (
+        r"""MODULE weld
+  RECORD part
+    num n;
+  ENDRECORD
+  PERS tooldata
+    torch := [TRUE];
+  PROC main()
+    AccSet 50, 50;
+    Own 1;
+    MoveL p10, v50,
+      fine, tool0;
+    GripOn \Fast;
+    TPWrite "a; Foo;";
+    IF a = 1 AND NOT b Pick;
+    IF a = 1 Set do1;
+    IF a THEN Place p10, 2; ELSE Stop; ENDIF
+    x := 5;
+    again:
+    GOTO again;
+    GripOn; ! Foo;
+    MoveHome;
+    WaitDI di1, 1;
+  ERROR
+    RETRY;
+  ENDPROC
+  LOCAL PROC own(num n)
+  ENDPROC
+ENDMODULE
+""",
+        [("GripOn", 12), ("Pick", 14), ("Place", 16), ("MoveHome", 21)],
+    ),
+    ".script": (
+        """def weld():
+  set_standard_digital_out(0, True)
+  if (get_digital_in(1) and not(False)):
+    grip(1)
+  end
+  seam()
+  gripper.close(1)
+  movel(pose_trans(get_actual_tcp_pose(), p[0,0,0,0,0,0]))
+  x = grip(2) # foo()
+  set_tool_2()
+  def seam():
+  sync()
+  end
+end
+""",
+        [("grip", 4), ("set_tool_2", 10)],
+    ),
+}
+
+
+@pytest.mark.parametrize("suffix", ABSENT)
+def test_a_routine_that_the_file_does_not_hold_is_listed_once(suffix: str) -> None:
+    text, names = ABSENT[suffix]
+    dialect = dialect_of(suffix)
+    assert dialect is not None
+    found = dialect.find(text, 6).absent
+    assert [sentence.split(" is not in this file")[0] for sentence in found] == [f"line {n}: {one}" for one, n in names]
+    assert all("wrong" in sentence for sentence in found)

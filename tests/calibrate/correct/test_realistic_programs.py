@@ -189,15 +189,22 @@ def test_a_joint_target_that_stays_is_the_posture_before_the_next():
 def test_a_seam_that_begins_corrected_and_goes_on_as_it_was_is_named():
     text = f"movel({ur(0)})\nmovel({ur(1)})\nmovel(pose_trans({ur(1)}, p[0.0, 0.0, 0.1, 0.0, 0.0, 0.0]))\n"
     done = corrected(text, ".script")
-    assert any(seam.startswith("lines 2 and 3:") for seam in done.seams)
-    assert not corrected(text.replace("movel(pose_trans", "movej(pose_trans"), ".script").seams
+    assert any(seam.startswith("lines 2 and 3:") for seam in done.warnings)
+    assert not corrected(text.replace("movel(pose_trans", "movej(pose_trans"), ".script").warnings
+
+
+def test_a_routine_of_another_file_is_a_warning_only():
+    text = f"BAS(#BASE, 0)\nGRIP()\nPTP {kuka(0)}\n"
+    done = corrected(text, ".src")
+    assert (len(done.names), done.skipped, len(done.warnings)) == (1, (), 1)
+    assert done.warnings[0].startswith("line 2: GRIP ")
 
 
 def test_an_assignment_between_two_moves_is_no_seam():
     text = f"a = {ur(0)}\nmovel(a)\na[2] = 0.1\nmovel({ur(1)})\n"
     done = corrected(text, ".script")
     assert done.skipped[0].startswith("line 3:")
-    assert not done.seams
+    assert not done.warnings
 
 
 def test_a_target_of_an_instruction_that_nobody_knows_is_listed():
