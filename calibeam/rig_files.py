@@ -13,7 +13,7 @@ ROBOTS = {"ur5e": "ur5e-tracker", "irb120": "irb120-modbus"}  # who asks for a r
 
 def rig_path(given: Path) -> Path:
     """A rig file by its path, or a shipped one with its devices by name: `ur5e`. DataError for a name of none."""
-    if given.suffix or given.exists():
+    if given.suffix or (given.exists() and not given.is_dir()):  # a pipe is fine
         return given
     shipped = {path.stem: path for path in sorted(RIGS.glob("*.toml"))}
     shipped |= {robot: shipped[rig] for robot, rig in ROBOTS.items() if rig in shipped}

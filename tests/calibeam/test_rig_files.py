@@ -33,5 +33,7 @@ def test_a_shipped_rig_is_found_by_its_name_or_its_robot(tmp_path, monkeypatch):
     assert rig_path(Path("mine.toml")) == Path("mine.toml")
     with pytest.raises(DataError, match="irb120-modbus"):
         rig_path(Path("ur55"))
+    (tmp_path / "irb120").mkdir()  # a folder is no rig file
+    assert rig_path(Path("irb120")).name == "irb120-modbus.toml"
     (tmp_path / "ur5e").write_text("")
     assert rig_path(Path("ur5e")) == Path("ur5e")  # a file of the user's own comes first
