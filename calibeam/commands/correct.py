@@ -194,7 +194,7 @@ def _table(job: _Job, poses: Path, out: Path, options: Options) -> Done:
     header, rows = corrected_rows(found, place)
     write_output(out, csv_text([header, *rows]), CORRECTED)
     given = tuple(
-        f"column {c} is no condition that the model depends on"
+        f"column {c} is not used: the model does not depend on it"
         for c in wanted.conditions
         if c not in conditions_of_effects(job.known) and c not in job.every
     )

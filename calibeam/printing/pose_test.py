@@ -14,10 +14,10 @@ from calibrate.iso9283.performance import DistancePerformance, Performance, Pose
 MM, MRAD = 1e3, 1e3
 DASH = "–"
 FRAMES = {
-    "fit": "the device stands where the poses themselves fit best: what moves all of them alike is no error here",
-    "model": "the device stands where the model's session found it",
-    "device": "as measured: repeatability does not depend on where the device stands",
-    "rig": "the device stands where [device] of the rig file puts it, taken to be exact",
+    "fit": "pose of the device: best fit of all poses; an error that is the same in all poses is not included",
+    "model": "pose of the device: as identified in the model's session",
+    "device": "as measured: repeatability does not depend on the pose of the device",
+    "rig": "pose of the device: [device] of the rig file, assumed to be exact",
 }
 
 
@@ -39,7 +39,7 @@ def print_pose_test(console: Console, found: EvaluatedTest, written: str) -> Non
             say(line.format(name))
     few = [one.pose for one in found.measured.poses if one.cycles < CYCLES]
     if few:
-        say(f"the standard asks for {CYCLES} cycles; fewer were taken of P{', P'.join(map(str, few))}")
+        say(f"the standard requires {CYCLES} cycles; there are fewer of P{', P'.join(map(str, few))}")
     say(FRAMES[found.frame])
     for note in found.notes:
         say(note)

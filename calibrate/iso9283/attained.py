@@ -33,8 +33,8 @@ Ints = NDArray[np.int64]
 Frame = Literal["fit", "model", "rig"]
 
 SAME_DATA = (
-    "same data: the model was fitted to these very readings, so what it predicts of them and their correction would "
-    "prove nothing; evaluate a test that it has not seen"
+    "same data: the model was fitted to these readings, so predicted and corrected figures would prove nothing; "
+    "evaluate a test that was not used in the fit"
 )
 JOINTLESS = "no joint angles in the samples"
 FLAT_M = 1e-3  # smallest second extent of the poses by which a frame is fitted: below, they lie on a line
@@ -119,7 +119,7 @@ def evaluate(
 def _repeatability(samples: Samples, sent: _Commanded, known: ModelFile | None) -> EvaluatedTest:
     """What needs no command: AP, AD and dAP are NaN. DataError with a model, which is asked at the commands."""
     if known is not None:
-        raise DataError(f"{JOINTLESS}: a model cannot be asked; give --plan, or the columns q1_rad …")
+        raise DataError(f"{JOINTLESS}: --model needs the commanded joints; give --plan, or the columns q1_rad …")
     part = samples.take(sent.rows)
     seen_m = np.stack([part.column(c) for c in POSITION], axis=1)
     nowhere = np.full(seen_m.shape, np.nan)
@@ -140,23 +140,21 @@ def _commanded(samples: Samples, rig: Rig, plan: PosePlan | None) -> _Commanded:
     notes: tuple[str, ...] = ()
     if given is None or np.isnan(given[with_position]).any():
         given = samples.joints()
-        notes = (
-            "no column cmd1_rad …: readings are taken for commands; the error of the controller itself is in no figure",
-        )
+        notes = ("no column cmd1_rad …: readings are used as commands; no figure includes the error of the controller",)
     number = samples.integers("repeat", 0)
     if np.isnan(given[with_position]).any() and not (number[with_position] > 0).any():
-        raise DataError(f"{JOINTLESS} and no column repeat: which rows are of one pose is not known; give one of them")
+        raise DataError(f"{JOINTLESS} and no column repeat: the rows of one pose cannot be found; give one of them")
     if plan is not None:
         number = _of_plan(given, number, plan, with_position)
     elif not (number[with_position] > 0).any():
         number = _alike(given, with_position)
     rows = np.flatnonzero(with_position & (number > 0))
     if len(rows) == 0:
-        raise DataError("no row with a position is of a repeated pose (column repeat); see calibeam iso9283 plan")
+        raise DataError("no row with a position belongs to a repeated pose (column repeat); see calibeam iso9283 plan")
     pose, q_rad = number[rows], given[rows].copy()
     if plan is not None and np.isnan(q_rad).any():
         q_rad = np.array([_of_number(plan)[int(one)] for one in pose])
-        notes = ("no joints in the samples: the poses of the plan are taken for commands",)
+        notes = ("no joints in the samples: the poses of the plan are used as commands",)
     elif notes:  # readings scatter as the arm does; what was sent is the same in every cycle
         for one in np.unique(pose):
             q_rad[pose == one] = q_rad[pose == one].mean(axis=0)
@@ -203,13 +201,13 @@ def _target(rig: Rig, known: ModelFile | None) -> tuple[Floats, tuple[str, ...]]
         return np.array(rig.tool.point_m), ()
     if known is None:
         raise DataError(
-            f"rig {rig.name}: no [tool] point_m: where the target sits in the flange is part of what was commanded; "
+            f"rig {rig.name}: no [tool] point_m: the commanded pose includes the position of the target in the flange; "
             "measure it (calibeam tool-axes), or give the --model of a calibration with this target"
         )
     # With a tool of no length, the real tool is the drawn flange as the model's arm carries it.
     mounted = Arms.of(known, Options(tool=np.eye(4))).real_tool
     point_m = Predictor.of(known).tip_at(inverse(mounted)[None])[0]
-    return point_m, ("the rig file has no [tool] point_m: the target is taken to be where the model has it",)
+    return point_m, ("the rig file has no [tool] point_m: the position of the target is that of the model",)
 
 
 def _device(frame: Frame, rig: Rig, known: ModelFile | None, there_m: Floats, seen_m: Floats) -> Floats:
@@ -230,7 +228,7 @@ def _fitted(there_m: Floats, seen_m: Floats) -> Floats:
     extent = np.linalg.svd(there_m - there_m.mean(axis=0), compute_uv=False) / np.sqrt(len(there_m))
     if len(there_m) < 3 or extent[1] < FLAT_M:
         raise DataError(
-            "--frame fit: the poses lie on a line or are fewer than three, so they do not show how the device stands; "
+            "--frame fit: fewer than three poses, or all on a line, do not determine the pose of the device; "
             "take more poses, or give --frame rig or a --model of the same set-up"
         )
     T = np.eye(4)
@@ -304,6 +302,6 @@ def _elsewhere(off_m: Floats, seen_m: Floats, there_m: Floats) -> tuple[str, ...
     if rms < MOVED_M or rms < MOVED_SHARE * least:
         return ()
     return (
-        f"in the stated frame of the device the model is {1e3 * rms:.1f} mm off, by a best fit {1e3 * least:.3f} mm: "
-        "the device seems to stand elsewhere than in the model's session; give --frame fit",
+        f"with the stated pose of the device the model is {1e3 * rms:.1f} mm off, by a best fit {1e3 * least:.3f} mm: "
+        "the device seems to have been moved since the model's session; give --frame fit",
     )

@@ -81,7 +81,7 @@ def test_figures_before_and_after_correction(folder, capsys):
     assert worst > 5e-4
     printed = capsys.readouterr().out
     assert "with the model's correction: AP 0.0" in printed
-    assert "the standard asks for 30 cycles" in printed
+    assert "the standard requires 30 cycles" in printed
     assert len(max(printed.splitlines(), key=len)) < 300
     after = figures(folder, "corrected", "--plan", str(folder / "plan.toml"), "--frame", "rig")
     for sent, corrected in zip(after["measured"]["poses"], before["corrected"]["poses"], strict=True):

@@ -70,8 +70,8 @@ def test_a_fitted_frame_absorbs_where_the_device_stands_and_no_distance():
 def test_a_device_that_was_moved_since_the_session_of_the_model_is_named():
     moved = (tuple(np.add(DEVICE[0], 0.01)), DEVICE[1])
     notes = evaluate(seen(Q[POSE - 1], POSE, device=moved), RIG_HERE, known()).notes
-    assert any("stand elsewhere" in note for note in notes)
-    assert not any("stand elsewhere" in n for n in evaluate(seen(Q[POSE - 1], POSE), RIG_HERE, known()).notes)
+    assert any("have been moved" in note for note in notes)
+    assert not any("have been moved" in n for n in evaluate(seen(Q[POSE - 1], POSE), RIG_HERE, known()).notes)
 
 
 def test_corrected_commands_are_judged_by_the_poses_of_the_plan():
@@ -130,7 +130,7 @@ def test_without_a_tool_point_the_target_is_the_models():
     with pytest.raises(DataError, match="point_m"):
         evaluate(samples, no_point)
     found = evaluate(samples, no_point, known())
-    assert any("where the model has it" in note for note in found.notes)
+    assert any("is that of the model" in note for note in found.notes)
     for one in found.measured.poses:  # but for how the flanges of both arms lie on each other
         assert one.accuracy_m.value == pytest.approx(true_error_m(one.pose), abs=5e-4)
         assert found.predicted_m[one.pose][0] == pytest.approx(one.accuracy_m.value, abs=1e-8)
