@@ -1,13 +1,14 @@
 """A table of another program as it stands in its file: xlsx, CSV of any dialect, or Parquet; nothing is converted yet.
 
 The heading row is the one with the most texts and no number, just above the numbers; rows above it are a title. A row
-of units may follow.
+of units may follow. Two rows that may be headings, with numbers between them, are refused.
 Decimals are a point or a comma, decided once for the whole file and refused where both occur.
 """
 
 import csv
 import importlib
 import io
+import itertools
 import math
 import re
 import zipfile
@@ -308,8 +309,11 @@ def _tabled(path: Path, name: str, rows: Sequence[tuple[int, Sequence[Raw]]], he
         raise SamplesError(f"{where}: --header-row {header_row}: nothing stands there; give the row of the headings")
     if at is None:
         raise SamplesError(
-            f"{where}: no row of headings with numbers below; write the columns' names above the numbers"
+            f"{where}: no row of headings with numbers below; write the columns' names above the numbers, or state "
+            "their row: --header-row"
         )
+    if header_row is None:
+        _refuse_two_headings(where, rows, at)
     wide = max(i for i, cell in enumerate(rows[at][1]) if cell is not None) + 1
     headings = tuple("" if cell is None else str(cell) for cell in _padded(rows[at][1], wide))
     if (longest := max(headings, key=len)) and len(longest) > LONGEST_HEADING:
@@ -331,25 +335,37 @@ def _tabled(path: Path, name: str, rows: Sequence[tuple[int, Sequence[Raw]]], he
 
 
 def _heading_row(rows: Sequence[tuple[int, Sequence[Raw]]]) -> int | None:
-    """Of rows with at least two texts and no number, in one of the two rows below which numbers stand, the one with the
-    most texts: titles have few. Of several the first, for units may stand below.
-    """
-    best: tuple[int, int] | None = None
+    """Of rows that may be headings the one with the most texts: titles have few. Of several the first."""
+    return max(_possible_headings(rows), key=lambda at: len(_texts(rows[at][1])), default=None)
+
+
+def _possible_headings(rows: Sequence[tuple[int, Sequence[Raw]]]) -> Iterator[int]:
+    """Rows of two texts and more, no number and nothing that is missing, with numbers in one of the two rows below."""
     for at, (_, cells) in enumerate(rows[:TITLE_ROWS]):
-        texts = [cell for cell in cells if isinstance(cell, str)]
-        if len(texts) < 2 or any(map(_is_number, cells)) or _comma_numbers(cells):
+        if len(_texts(cells)) < 2 or any(map(_is_missing, cells)) or _numbers(cells):
             continue
-        below = [c for _, c in rows[at + 1 :] if any(_filled(c))][:2]
-        numbers = any(sum(map(_is_number, c)) + _comma_numbers(c) >= 2 for c in below)
-        if numbers and (best is None or len(texts) > best[0]):
-            best = len(texts), at
-    return None if best is None else best[1]
+        below = itertools.islice((c for _, c in itertools.islice(rows, at + 1, None) if any(_filled(c))), 2)
+        if any(len(_numbers(c)) >= 2 for c in below):
+            yield at
+
+
+def _refuse_two_headings(where: str, rows: Sequence[tuple[int, Sequence[Raw]]], at: int) -> None:
+    """SamplesError where another row may be the headings of numbers that stand between it and row `at`."""
+    for other in _possible_headings(rows):
+        first, second = sorted((at, other))
+        both = _texts(rows[first][1]) & _texts(rows[second][1])
+        if any(len(_numbers(cells) & both) >= 2 for _, cells in rows[first + 1 : second]):
+            raise SamplesError(
+                f"{where}: row {rows[first][0]} and row {rows[second][0]} may both be the headings, and numbers stand "
+                f"between them; save each table as a file of its own, or choose one: --header-row {rows[second][0]} "
+                "leaves out the rows above it"
+            )
 
 
 def _is_unit_row(cells: Sequence[Raw]) -> bool:
     """Whether a row below the headings holds texts alone, most of them units: no row of missing readings."""
     texts = [cell.strip("[]()") for cell in cells if isinstance(cell, str)]
-    if len(texts) < sum(_filled(cells)) or any(map(_is_number, cells)) or _comma_numbers(cells):
+    if len(texts) < sum(_filled(cells)) or _numbers(cells):
         return False
     return 2 * sum(1 for text in texts if unit_of(text)) > len(texts)
 
@@ -389,8 +405,13 @@ def _is_number(cell: Raw) -> bool:
     return isinstance(cell, int | float) and not isinstance(cell, bool)
 
 
-def _comma_numbers(cells: Sequence[Raw]) -> int:
-    return sum(1 for cell in cells if isinstance(cell, str) and COMMA_NUMBER.fullmatch(cell))
+def _numbers(cells: Sequence[Raw]) -> set[int]:
+    """The columns of numbers, with a decimal point or comma."""
+    return {i for i, c in enumerate(cells) if _is_number(c) or (isinstance(c, str) and COMMA_NUMBER.fullmatch(c))}
+
+
+def _texts(cells: Sequence[Raw]) -> set[int]:
+    return {i for i, cell in enumerate(cells) if isinstance(cell, str)}
 
 
 def _is_missing(cell: Raw) -> bool:

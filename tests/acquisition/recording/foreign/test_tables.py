@@ -305,6 +305,26 @@ def test_a_row_of_headings_that_is_stated_is_taken(tmp_path, rig_source):
     assert "--header-row 9" in refused_by(lambda: read_sheet(path, header_row=9))
 
 
+def test_a_restarted_log_with_headings_again_is_refused_and_no_row_is_lost(tmp_path, rig_source):
+    rows, path = table_of(session(rows=30), "deg", "mm"), tmp_path / "lab.csv"
+    write_csv(path, HEADINGS, [*rows[:10], [*HEADINGS, "temp_arm [degC]"], *((*row, 20.5) for row in rows[10:])])
+    message = refused_by(lambda: read_sheet(path))
+    assert "lab.csv: row 1 and row 12 may both be the headings" in message
+    assert "--header-row 12" in message
+    assert len(read_sheet(path, header_row=12).rows) == 20
+    write_csv(path, [*HEADINGS, "temp_arm [degC]"], [*((*row, 20.5) for row in rows[:10]), HEADINGS, *rows[10:]])
+    assert "row 1 and row 12" in refused_by(lambda: read_sheet(path))
+
+
+def test_readings_that_are_not_there_are_no_headings(tmp_path):
+    rows = table_of(session(rows=6), "deg", "mm")
+    rows.insert(3, (*["nan"] * 9, "lost"))
+    sheet = read_sheet(write_csv(tmp_path / "lab.csv", [*HEADINGS, "remark"], rows))
+    assert (sheet.heading_line, len(sheet.rows)) == (1, 7)
+    path = write_csv(tmp_path / "lab.csv", HEADINGS, rows)
+    assert "row 5: more cells than the 9 headings" in refused_by(lambda: read_sheet(path))
+
+
 def refused_by(call):
     with pytest.raises(SamplesError) as error:
         call()
