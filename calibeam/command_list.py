@@ -51,7 +51,7 @@ GROUPS: dict[str, tuple[ListedCommand, ...]] = {
             "tool-axes", "tool_axes:tool_axes_command", "Locate the target on the flange by single-axis turns."
         ),
         ListedCommand("verify", "verify:verify_command", "Verify a measuring arm by spheres, cones and length bars."),
-        ListedCommand("iso9283", "iso9283:iso9283", "Plan a pose test after ISO 9283, or evaluate a recording of one."),
+        ListedCommand("iso9283", "iso9283:iso9283", "Plan a pose test to ISO 9283, or evaluate a recording of one."),
         ListedCommand("batch", "batch:batch_command", "Identify every recording below a folder; table and drift page."),
     ),
     "Simulation": (

@@ -59,8 +59,8 @@ def correct_command(
     """Correct poses or a program, so that the real tool reaches them.
 
     A table of poses becomes a table of joint commands and corrected poses; in a program of URScript, KRL, RAPID or
-    FANUC LS only the numbers of targets change. The predicted tool error of every pose stands beside it, before and
-    after, with its sigma. Poses that are unreachable, near a limit or beyond the calibrated range are listed.
+    FANUC LS only the numbers of targets change. The predicted tool error of every pose is reported, before and after,
+    with its sigma. Poses that are unreachable, near a limit or beyond the calibrated range are listed.
 
     For example:
 
@@ -75,24 +75,24 @@ def correct_command(
         The model.json of a diagnosis or an identification; its rig file is what the controller computes with.
     poses
         poses.csv, or a program (.script, .src, .dat, .mod, .prg, .ls); of KRL both files, .src and .dat, are taken
-        where they stand side by side.
+        if they are in the same folder.
     out
         The file to write; never the input itself.
     approach
-        Let every joint come from one side: overshoot points are inserted before each pose.
+        Let every joint arrive from one side: overshoot points are inserted before each pose.
     overshoot_deg
-        How far an overshoot point lies off, in every joint.
+        Distance of an overshoot point from its pose, in every joint.
     margin_deg
         Poses with a joint nearer than this to its limit are listed.
     tool
-        Tool centre point in the flange as the controller has it: x y z in m, rotation vector in rad; it is taken to be
+        Tool centre point in the flange as the controller has it: x y z in m, rotation vector in rad; it is assumed
         exact. Default: the program's; else the rig file's point for the controller, the model's for the real tool.
     frame
         Frame of the poses in the base, where the program does not hold it: x y z in m, rotation vector in rad; or its
         name, with --points.
     points
         Table (.csv) of three or more points of the frame that the tool touched: x_m, y_m, z_m in the frame, q1_rad ...
-        as read. The frame is fitted to them, and has to be entered into the controller.
+        as read. The frame is fitted to them and must be entered into the controller.
     joint_targets
         Correct joint targets, too, as poses of the rig file's arm; without it they stay as they are.
     start

@@ -1,4 +1,4 @@
-"""`calibeam iso9283`: a pose test after ISO 9283 as a plan, and what a recording of it shows."""
+"""`calibeam iso9283`: a pose test to ISO 9283 as a plan, and what a recording of it shows."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -58,7 +58,7 @@ FORMULAS = {
 
 iso9283 = App(
     name="iso9283",
-    help="Plan a pose test after ISO 9283, or evaluate a recording of one.\n\n"
+    help="Plan a pose test to ISO 9283, or evaluate a recording of one.\n\n"
     "Pose accuracy and repeatability, their variation by approach, distances, drift; before and after correction.\n\n"
     "For example:\n\n```\ncalibeam iso9283 plan rig.toml --out iso9283.toml\n"
     "calibeam iso9283 evaluate session --model model.json\n```",
@@ -101,9 +101,9 @@ def plan(
 ) -> None:
     """Choose the test cube and write its five poses as a pose plan.
 
-    The largest cube of those tried that stands before the arm, its edges along the axes of the base; P1 in its centre,
-    P2 to P5 a tenth of a diagonal from its corners. A cycle visits P5, P4, P3, P2, P1; the visit of P1 before the first
-    cycle does not count. The number of a pose is its `repeat`.
+    The largest cube tried that is in reach in front of the arm, its edges along the axes of the base. P1 is its centre,
+    P2 to P5 are a tenth of a diagonal from its corners. A cycle visits P5, P4, P3, P2, P1; the visit of P1 before the
+    first cycle does not count. The number of a pose is its `repeat`.
 
     For example:
 
@@ -174,8 +174,8 @@ def evaluate_test(
 ) -> None:
     """Evaluate a recording: pose accuracy and repeatability, distances, drift.
 
-    Rows of one pose are those of one number in column `repeat`; without it, those with the same joints. A table with
-    that column and positions but without joints has the repeatability; with --plan all figures.
+    Rows with the same number in column `repeat` belong to one pose; without it, rows with the same joints. For a table
+    with that column and positions but without joints, repeatability is reported; with --plan all figures.
 
     For example:
 

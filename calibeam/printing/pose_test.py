@@ -1,4 +1,4 @@
-"""A pose test after ISO 9283 on the terminal: the largest figures first, then a line a pose."""
+"""A pose test to ISO 9283 on the terminal: the largest figures first, then a line a pose."""
 
 import math
 from collections.abc import Callable, Sequence
