@@ -342,7 +342,7 @@ def _heading_row(rows: Sequence[tuple[int, Sequence[Raw]]]) -> int | None:
 def _possible_headings(rows: Sequence[tuple[int, Sequence[Raw]]]) -> Iterator[int]:
     """Rows of two texts and more, no number and nothing that is missing, with numbers in one of the two rows below."""
     for at, (_, cells) in enumerate(rows[:TITLE_ROWS]):
-        if len(_texts(cells)) < 2 or any(map(_is_missing, cells)) or _numbers(cells):
+        if len(_texts(cells)) < 2 or any(map(_is_missing, cells)) or _numbers(cells) or _is_unit_row(cells):
             continue
         below = itertools.islice((c for _, c in itertools.islice(rows, at + 1, None) if any(_filled(c))), 2)
         if any(len(_numbers(c)) >= 2 for c in below):

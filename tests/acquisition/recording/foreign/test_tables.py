@@ -316,6 +316,15 @@ def test_a_restarted_log_with_headings_again_is_refused_and_no_row_is_lost(tmp_p
     assert "row 1 and row 12" in refused_by(lambda: read_sheet(path))
 
 
+@pytest.mark.parametrize("first_two", [("-", "-"), ("s", "K")])
+def test_units_are_no_headings_though_some_columns_have_no_name(tmp_path, rig_source, first_two):
+    given = session(rows=5)
+    rows = [(k, 20.5, *row) for k, row in enumerate(table_of(given, "deg", "mm"))]
+    headings, units = ["no", "", *(f"q{i}" for i in range(1, 7)), "X", "Y", "Z"], [*["deg"] * 6, *["mm"] * 3]
+    path = write_csv(tmp_path / "lab.csv", headings, rows, units=[*first_two, *units])
+    close(imported(path, rig_source, "no = unused")[1], given)
+
+
 def test_readings_that_are_not_there_are_no_headings(tmp_path):
     rows = table_of(session(rows=6), "deg", "mm")
     rows.insert(3, (*["nan"] * 9, "lost"))
