@@ -29,7 +29,7 @@ from acquisition.recording.foreign.column_meanings import (
     understood,
     unit_in,
 )
-from acquisition.recording.foreign.heading_units import Unit, symbols, unit_of
+from acquisition.recording.foreign.heading_units import Unit, is_degree_or_gon, symbols, unit_of
 from acquisition.recording.foreign.rotations import CONVENTIONS, bad_matrix, bad_quaternion, of_matrices
 from acquisition.recording.foreign.sheet import Raw, Sheet
 from acquisition.recording.recording import Recording
@@ -155,12 +155,15 @@ def questions(table: Understanding, *, settled: bool = True) -> Iterator[Questio
         if not group.suffix or (group.meaning == TIME and is_dated(table.sheet, group.columns[0])):
             continue
         unit = unit_of(group.unit)
-        choices = symbols(group.suffix)
+        ambiguous = group.suffix == "rad" and is_degree_or_gon(group.unit)
+        choices = ("deg", "gon") if ambiguous else symbols(group.suffix)
         if group.stated and (unit is None or unit.suffix != group.suffix):
             raise SamplesError(
                 f"--columns: '{shown(group.unit, 20)}' is no unit of {group.meaning}; use {', '.join(choices)}"
             )
-        if group.unit and unit is None:
+        if ambiguous:
+            why = f"'{shown(group.unit, 20)}' is the degree in some programs and the gon in others; write deg or gon"
+        elif group.unit and unit is None:
             why = f"the unit '{shown(group.unit, 20)}' is not known"
         elif unit is not None and unit.suffix != group.suffix:
             why = f"'{shown(group.unit, 20)}' is no unit of {group.meaning}"

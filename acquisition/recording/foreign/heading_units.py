@@ -28,8 +28,7 @@ _DEGREE = math.pi / 180.0
 _FACTORS: Mapping[str, Mapping[str, float]] = {
     "rad": {
         **{symbol: float(factor) for symbol, factor in UNITS["rad"].items()},
-        # "Grad" is the German word for a degree; the 400th of a turn is "gon" there.
-        **dict.fromkeys(("deg", "°", "degree", "degrees", "degs", "Grad", "Grd"), _DEGREE),
+        **dict.fromkeys(("deg", "°", "degree", "degrees", "degs"), _DEGREE),
         "gon": math.tau / 400.0,
         "arcmin": _DEGREE / 60.0,
         "arcsec": _DEGREE / 3600.0,
@@ -56,6 +55,8 @@ _BY_SYMBOL: Mapping[str, Unit] = MappingProxyType(
     | {symbol.casefold(): Unit(symbol, "degC", 1.0, -273.15) for symbol in _KELVIN}
     | {symbol.casefold(): Unit(symbol, "degC", 5.0 / 9.0, -160.0 / 9.0) for symbol in _FAHRENHEIT}
 )
+# German nouns have a capital: "Grad" is a degree. As "grad" or "GRAD" other languages and calculators write the gon.
+_GERMAN_DEGREE = {symbol: Unit(symbol, "rad", _DEGREE) for symbol in ("Grad", "Grd")}
 _PLAIN_NUMBER = ("", "1", "-", "—")  # what stands where a column has no unit
 
 _BRACKETED = re.compile(r"(.*?)\s*\[([^\]]*)\]")
@@ -69,7 +70,18 @@ _SUFFIXED = re.compile(r"(.+?)_(rad_s|deg_s|rad|mrad|deg|m|cm|mm|um|s|ms|us|ns|k
 
 def unit_of(symbol: str) -> Unit | None:
     """The unit of this symbol, in whatever case; None where it is none that is known."""
-    return _BY_SYMBOL.get(symbol.strip().casefold())  # µ (micro) and μ (mu) fold alike
+    german = _GERMAN_DEGREE.get(symbol.strip())
+    return german or _BY_SYMBOL.get(symbol.strip().casefold())  # µ (micro) and μ (mu) fold alike
+
+
+def is_degree_or_gon(symbol: str) -> bool:
+    """Whether a unit is a degree to some programs and a gon to others: `grad`, `GRAD`."""
+    return unit_of(symbol) is None and symbol.strip().capitalize() in _GERMAN_DEGREE
+
+
+def is_unit(symbol: str) -> bool:
+    """Whether a text is a unit, be it an ambiguous one."""
+    return unit_of(symbol) is not None or is_degree_or_gon(symbol)
 
 
 def symbols(suffix: str) -> tuple[str, ...]:
@@ -88,7 +100,7 @@ def split_heading(heading: str) -> tuple[str, str]:
         return match[1].strip(), "" if match[2].strip() in _PLAIN_NUMBER else match[2].strip()
     for form in (_IN_PARENTHESES, _BEHIND_IN, _BEHIND_SPACE, _BEHIND_STROKE, _SUFFIXED):
         match = form.fullmatch(heading)
-        if match and match[1].strip() and unit_of(match[2]):
+        if match and match[1].strip() and is_unit(match[2]):
             return match[1].strip(), match[2].strip()
     return heading.strip(), ""
 

@@ -22,7 +22,7 @@ from typing import Any
 from acquisition.recording.errors import SamplesError, shown
 from acquisition.recording.files.bounds import UNPACKED_BYTES
 from acquisition.recording.files.table_file import check_cells, parquet_table, table_bytes
-from acquisition.recording.foreign.heading_units import unit_of
+from acquisition.recording.foreign.heading_units import is_unit
 
 SUFFIXES = (".xlsx", ".xlsm", ".csv", ".tsv", ".txt", ".parquet")
 SEPARATORS = (";", "\t", ",")  # in this order: a table with decimal commas has them inside its cells
@@ -367,7 +367,7 @@ def _is_unit_row(cells: Sequence[Raw]) -> bool:
     texts = [cell.strip("[]()") for cell in cells if isinstance(cell, str)]
     if len(texts) < sum(_filled(cells)) or _numbers(cells):
         return False
-    return 2 * sum(1 for text in texts if unit_of(text)) > len(texts)
+    return 2 * sum(1 for text in texts if is_unit(text)) > len(texts)
 
 
 def _decimal(where: str, lines: Sequence[int], rows: Iterable[tuple[Raw, ...]]) -> str:

@@ -280,6 +280,20 @@ def test_names_of_makers_are_known_with_their_units(tmp_path, rig_source, names,
     close(imported(path, rig_source)[1], given)
 
 
+@pytest.mark.parametrize("heading", ["A{} [grad]", "A{} (GRAD)", "A{}/grad", "A{} [grd]", "A{}"])
+def test_degrees_and_gon_are_not_confused(tmp_path, rig_source, heading):
+    headings, rows = [*(heading.format(i) for i in range(1, 7)), "X [mm]", "Y [mm]", "Z [mm]"], session(rows=20)
+    units = None if heading != "A{}" else [*["GRAD"] * 6, *["mm"] * 3]
+    message = refused(tmp_path, rig_source, headings, table_of(rows, "deg", "mm"), units=units)
+    assert "write deg or gon" in message
+    assert "[deg|gon] = q" in message
+    rows["q"] *= 200.0 / 180.0  # 400 gon are a turn
+    path = write_csv(tmp_path / "gon.csv", [*(f"A{i} [gon]" for i in range(1, 7)), *"XYZ"], table_of(rows, "deg", "mm"))
+    close(imported(path, rig_source, "X Y Z [mm] = position")[1], session(rows=20))
+    stated = refused_by(lambda: imported(path, rig_source, "A1..A6 [grad] = q, X Y Z [mm] = position"))
+    assert "use deg, gon" in stated
+
+
 def test_the_unit_of_a_makers_name_is_held_against_the_values(tmp_path, rig_source):
     given = session(rows=20, seed=4)
     headings = [*(f"rax_{i}" for i in range(1, 7)), "X [mm]", "Y [mm]", "Z [mm]"]
