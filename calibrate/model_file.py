@@ -26,6 +26,7 @@ from acquisition.recording.files.bounds import (
     Whole,
 )
 from acquisition.recording.output import json_output
+from acquisition.recording.samples import Samples, measured_sha256, readings_sha256
 from calibrate.errors import DataError
 from calibrate.older_models import with_present_names
 from calibrate.parameters import Parameter
@@ -195,10 +196,18 @@ class ModelFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     bootstrap: BootstrapRecord | None = None
     plan: FileText | None = None
     fit: FitRecord | None = None  # absent in models of earlier versions
-    readings_sha256: Label | None = None  # which readings it was made of (acquisition/recording/samples.py)
+    readings_sha256: Label | None = None  # which joint angles it was made of (acquisition/recording/samples.py)
     effects: Many[Effect] = ()
     needs: Many[Name] = ()
     session: SessionRecord | None = None
+    measured_sha256: Label | None = None  # and which measurements; absent in models of earlier versions
+
+    def made_of(self, samples: Samples) -> bool | None:
+        """Whether these are the readings of the fit; None where the joint angles are, and no more can be compared."""
+        measured = measured_sha256(samples)
+        if self.readings_sha256 != readings_sha256(samples):
+            return False
+        return True if self.measured_sha256 == measured else None if None in (self.measured_sha256, measured) else False
 
     def __post_init__(self) -> None:
         check_physics(self.schema, self.effects, self.session)

@@ -30,6 +30,7 @@ ORIENTATION = ("rx_rad", "ry_rad", "rz_rad")  # beside a position: a full pose
 WIRE = "wire_m"
 SEAT = "seat"
 BAR, BAR_END = "bar", "bar_end"
+MEASURED = (*SPOTS, WIRE, *(f"{device}{name}" for device in ("", "camera_") for name in (*POSITION, *ORIENTATION)))
 TARGET = "target"  # which [[target]] of the rig a row is of
 COMPLETE_PER_JOINT = (("q", "_rad"), ("cmd", "_rad"), ("enc", "_rad"))  # one column for every joint, or none
 
@@ -146,4 +147,15 @@ def cells_of(name: str, values: NDArray[Any]) -> list[Cell]:
 
 def readings_sha256(samples: Samples) -> str:
     """Of the joint angles in their order, hexadecimal; what else is stated of the rows does not count."""
-    return hashlib.sha256(np.ascontiguousarray(samples.joints(), dtype="<f8").tobytes()).hexdigest()
+    return _sha256(samples.joints())
+
+
+def measured_sha256(samples: Samples) -> str | None:
+    """Of what was measured at the joint angles, hexadecimal; None where nothing but these was."""
+    names = (*MEASURED, *per_joint("enc", "_rad", samples.n_joints))
+    found = [np.round(samples.column(name), 9) for name in names if name in samples]
+    return _sha256(np.stack(found)) if found else None
+
+
+def _sha256(values: Floats) -> str:
+    return hashlib.sha256(np.ascontiguousarray(values, dtype="<f8").tobytes()).hexdigest()

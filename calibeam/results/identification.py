@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from acquisition.recording import Recording, readings_sha256
 from acquisition.recording.rig import Rig, rig_sha256
+from acquisition.recording.samples import measured_sha256
 from calibeam.outcome import PartialResult
 from calibrate.errors import DataError
 from calibrate.fit import Status
@@ -93,10 +94,11 @@ def session_model(result: Identification, recording: Recording, planned: Planned
     text, rig = recording.rig_text, recording.rig
     told = Planned() if planned is None else planned
     arm_model = (told.plan.model or rig.arm.model).value
-    identity, readings = RigIdentity(rig.name, rig_sha256(text), text), readings_sha256(recording.samples)
-    model = msgspec.structs.replace(record_of(result, identity, arm_model, told.text), readings_sha256=readings)
+    identity, samples = RigIdentity(rig.name, rig_sha256(text), text), recording.samples
+    hashes = {"readings_sha256": readings_sha256(samples), "measured_sha256": measured_sha256(samples)}
+    model = msgspec.structs.replace(record_of(result, identity, arm_model, told.text), **hashes)
     left = [(i.name, i.rows[:, 0], i.misfit) for i in result.instruments if i.rows.shape[1] == 1]
-    return as_fitted(model, recording.samples, left)
+    return as_fitted(model, samples, left)
 
 
 def write_session_model(

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from acquisition.recording import Samples, readings_sha256
+from acquisition.recording import Samples
 from acquisition.recording.pose_plan import PosePlan
 from acquisition.recording.rig import Rig
 from acquisition.recording.samples import ORIENTATION, POSITION
@@ -36,6 +36,7 @@ SAME_DATA = (
     "same data: the model was fitted to these readings, so predicted and corrected figures would prove nothing; "
     "evaluate a test that was not used in the fit"
 )
+SAME_JOINTS = "same joint angles as of the fit: if it had these readings, predicted and corrected figures prove nothing"
 JOINTLESS = "no joint angles in the samples"
 FLAT_M = 1e-3  # smallest second extent of the poses by which a frame is fitted: below, they lie on a line
 MOVED_M, MOVED_SHARE = 1e-3, 5.0  # a device that stands elsewhere: error in the model's frame, and over that of a fit
@@ -76,7 +77,7 @@ def evaluate(
     target point or poses are missing.
     """
     chosen: Frame = frame or ("fit" if known is None else "model")
-    of_these = known is not None and known.readings_sha256 == readings_sha256(samples)
+    of_these = known is not None and known.made_of(samples)
     samples = samples.take(np.argsort(samples.column("t_s"), kind="stable"))
     sent = _commanded(samples, rig, plan)
     part = samples.take(sent.rows)
@@ -96,6 +97,8 @@ def evaluate(
     notes = (*sent.notes, *notes)
     if of_these:
         notes = (*notes, SAME_DATA)
+    elif of_these is None:
+        notes = (*notes, SAME_JOINTS)
     if known is None or of_these:
         return EvaluatedTest(len(part), chosen, performance_of(measured), {}, None, notes)
     by_model = placed(known, _at(part, sent.q_rad))

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 from msgspec import structs
 
-from acquisition.recording import Recording, readings_sha256
+from acquisition.recording import Recording
 from calibrate.diagnose.blunders_first import blunders_first
 from calibrate.diagnose.diagnosis import Verdict
 from calibrate.diagnose.fitted import fit_geometry
@@ -107,7 +107,7 @@ def refit(known: ModelFile, recording: Recording) -> Refitted:
     if cleared.whole_file:
         raise DataError("; besides, ".join(b.says for b in cleared.blunders if b.whole_file))
     session = session_of(recording.rig, cleared.samples)
-    entering = Known(known, known.readings_sha256 == readings_sha256(recording.samples)).effects
+    entering = Known(known, known.made_of(recording.samples) is not False).effects
     used, notes = _possible(tuple(e for e in entering if not e.after), fit_geometry(session).drivers)
     notes += [f"left out, true of its own session only: {e.name}" for e in known.effects if e not in entering]
     before, fit = with_structure(used, session)

@@ -13,6 +13,7 @@ from scipy.stats import chi2
 
 from acquisition.recording import Recording, Samples, readings_sha256
 from acquisition.recording.rig import rig_sha256
+from acquisition.recording.samples import measured_sha256
 from calibrate.diagnose.bench import Bench
 from calibrate.diagnose.blunders_first import Cleared
 from calibrate.diagnose.curve import Curve
@@ -129,6 +130,7 @@ def model_of_fit(
         blunders=tuple(left_out(b) for b in cleared.blunders),
         alarms=alarms,
         readings_sha256=readings_sha256(recording.samples),
+        measured_sha256=measured_sha256(recording.samples),
         fit=_fit_record(fit),
         effects=_effects(fit, findings, names, covariance),
         needs=needs,

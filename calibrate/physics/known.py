@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.recording import Samples, readings_sha256
+from acquisition.recording import Samples
 from calibrate.diagnose.assumed import Assumed, Stated
 from calibrate.diagnose.fitted import Fitted, fit_from_model, fit_geometry, given
 from calibrate.diagnose.linearised import Accepted
@@ -61,7 +61,7 @@ class Known:
 
 def known_before(model: ModelFile, samples: Samples) -> Known:
     """`samples`: all of the recording. DataError where a later recording is asked of a model without a covariance."""
-    same = model.readings_sha256 == readings_sha256(samples)
+    same = model.made_of(samples) is not False
     if not same and model.covariance is None:
         raise DataError(
             "the model has no covariance, so it is not known what would have changed; diagnose its recording again "

@@ -10,7 +10,7 @@ from typing import Literal
 
 import msgspec
 
-from acquisition.recording import Recording, readings_sha256
+from acquisition.recording import Recording
 from acquisition.recording.rig import Arm, Rig, parse_rig
 from calibrate.errors import DataError
 from calibrate.model_file import ModelFile
@@ -22,6 +22,7 @@ STANDARDS: tuple[Callable[[Measured], tuple[Figure, ...]], ...] = (
     standards.iso10360_12_figures,
     standards.b89_4_22_figures,
 )
+SAME_JOINTS = " The model was fitted at the same joint angles; if to these readings, the result proves nothing."
 
 
 @dataclass(frozen=True)
@@ -31,6 +32,7 @@ class Verification:
     figures: tuple[Figure, ...]
     samples: int
     left_out: tuple[str, ...] = ()  # series of touches that show no sphere, and why
+    same_joints: bool = False  # as those of the fit, by a model that an earlier version wrote
 
     @property
     def failed(self) -> tuple[Figure, ...]:
@@ -54,6 +56,7 @@ class Verification:
         parts = [figure.symbol for figure in self.judged if not figure.complete]
         rest = f" Part of the test only, with fewer measurements than it asks for: {', '.join(parts)}." if parts else ""
         rest += " Series were left out." if self.left_out else ""
+        rest += SAME_JOINTS if self.same_joints else ""
         return f"Conforms in all {len(self.judged)} figures that were judged.{rest}"
 
 
@@ -63,7 +66,7 @@ def verify(recording: Recording, model: ModelFile) -> Verification:
     found = measured(recording.samples, recording.rig, Predictor.of(model))
     standards.refuse_without_probe(found)
     figures = tuple(f for figures in STANDARDS for f in figures(found))
-    return Verification(figures, len(recording.samples), found.left_out)
+    return Verification(figures, len(recording.samples), found.left_out, model.made_of(recording.samples) is None)
 
 
 def refuse_wrong_model(recording: Recording, model: ModelFile) -> None:
@@ -79,7 +82,7 @@ def refuse_wrong_model(recording: Recording, model: ModelFile) -> None:
         )
     if model.rig.text is not None:
         _refuse_other_drawing(parse_rig(model.rig.text, f"rig.toml in the model of {model.rig.name}"), rig)
-    if model.readings_sha256 is not None and model.readings_sha256 == readings_sha256(recording.samples):
+    if model.made_of(recording.samples):
         raise DataError(
             "the model was made of these very readings and fits them whatever it is worth; verify by others: "
             "`calibeam session RIG --verify` takes them"

@@ -99,6 +99,17 @@ def test_a_model_of_another_arm_or_of_these_very_readings_is_refused(tmp_path: P
     assert not (tmp_path / "v.json").exists()
 
 
+def test_other_measurements_at_the_joint_angles_of_the_fit_are_verified(tmp_path: Path, capsys) -> None:
+    folder, path = session(tmp_path / "good", 0.0), tmp_path / "model.json"
+    table = (folder / "samples.csv").read_text().splitlines()
+    (folder / "samples.csv").write_text("\n".join(f"{row},{'wire_m' if k == 0 else k}" for k, row in enumerate(table)))
+    older = msgspec.structs.replace(perfect_model(), readings_sha256=readings_sha256(read(folder).samples))
+    for measured, says in ((None, True), ("0" * 64, False)):
+        write_model(path, msgspec.structs.replace(older, measured_sha256=measured))
+        assert verified(folder, path)[0] == 0
+        assert ("at the same joint angles" in " ".join(capsys.readouterr().out.split())) == says
+
+
 def test_json_is_one_object_and_nothing_else(tmp_path: Path, model: Path, capsys) -> None:
     verified(session(tmp_path / "good", 0.0), model, "--json")
     assert json.loads(capsys.readouterr().out)["kind"] == "calibeam-verification"

@@ -6,6 +6,7 @@ import pytest
 from acquisition.recording import Samples, readings_sha256
 from acquisition.recording.pose_plan import PlannedBlock, PlannedPose, PosePlan
 from acquisition.recording.rig import parse_rig
+from acquisition.recording.samples import measured_sha256
 from calibrate.correct.corrected import Options, Wanted, correct
 from calibrate.errors import DataError
 from calibrate.iso9283.attained import evaluate
@@ -47,11 +48,19 @@ def test_the_model_predicts_the_accuracy_and_its_correction_leaves_only_scatter(
 
 def test_a_model_corrects_no_test_that_it_was_fitted_to():
     samples = seen(Q[POSE - 1], POSE, RNG_OFF_M)
-    own = evaluate(samples, RIG_HERE, known(readings_sha256=readings_sha256(samples)))
+    older = {"readings_sha256": readings_sha256(samples)}  # as earlier versions wrote it: of joint angles alone
+    hashes = {**older, "measured_sha256": measured_sha256(samples)}
+    own = evaluate(samples, RIG_HERE, known(**hashes))
     assert own.corrected is None
     assert not own.predicted_m
     assert any(note.startswith("same data") for note in own.notes)
     assert own.measured == evaluate(samples, RIG_HERE, known()).measured
+    anew = evaluate(seen(Q[POSE - 1], POSE, -RNG_OFF_M), RIG_HERE, known(**hashes))
+    assert anew.corrected is not None
+    assert not any(note.startswith("same") for note in anew.notes)
+    unknown = evaluate(samples, RIG_HERE, known(**older))
+    assert unknown.corrected is not None
+    assert any(note.startswith("same joint angles") for note in unknown.notes)
 
 
 def test_a_fitted_frame_absorbs_where_the_device_stands_and_no_distance():
