@@ -147,15 +147,11 @@ def cells_of(name: str, values: NDArray[Any]) -> list[Cell]:
 
 def readings_sha256(samples: Samples) -> str:
     """Of the joint angles in their order, hexadecimal; what else is stated of the rows does not count."""
-    return _sha256(samples.joints())
+    return hashlib.sha256(np.ascontiguousarray(samples.joints(), dtype="<f8").tobytes()).hexdigest()
 
 
 def measured_sha256(samples: Samples) -> str | None:
     """Of what was measured at the joint angles, hexadecimal; None where nothing but these was."""
     names = (*MEASURED, *per_joint("enc", "_rad", samples.n_joints))
     found = [np.round(samples.column(name), 9) for name in names if name in samples]
-    return _sha256(np.stack(found)) if found else None
-
-
-def _sha256(values: Floats) -> str:
-    return hashlib.sha256(np.ascontiguousarray(values, dtype="<f8").tobytes()).hexdigest()
+    return hashlib.sha256(np.stack(found).astype("<f8").tobytes()).hexdigest() if found else None

@@ -29,7 +29,7 @@ from acquisition.recording.foreign.column_meanings import (
     understood,
     unit_in,
 )
-from acquisition.recording.foreign.heading_units import Unit, is_degree_or_gon, symbols, unit_of
+from acquisition.recording.foreign.heading_units import AMBIGUOUS, Unit, symbols, unit_of
 from acquisition.recording.foreign.rotations import CONVENTIONS, bad_matrix, bad_quaternion, of_matrices
 from acquisition.recording.foreign.sheet import Raw, Sheet
 from acquisition.recording.recording import Recording
@@ -155,8 +155,8 @@ def questions(table: Understanding, *, settled: bool = True) -> Iterator[Questio
         if not group.suffix or (group.meaning == TIME and is_dated(table.sheet, group.columns[0])):
             continue
         unit = unit_of(group.unit)
-        ambiguous = group.suffix == "rad" and is_degree_or_gon(group.unit)
-        choices = ("deg", "gon") if ambiguous else symbols(group.suffix)
+        ambiguous = group.suffix == "rad" and unit is not None and unit.suffix == AMBIGUOUS
+        choices = symbols(AMBIGUOUS if ambiguous else group.suffix)
         if group.stated and (unit is None or unit.suffix != group.suffix):
             raise SamplesError(
                 f"--columns: '{shown(group.unit, 20)}' is no unit of {group.meaning}; use {', '.join(choices)}"

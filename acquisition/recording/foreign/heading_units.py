@@ -24,6 +24,7 @@ class Unit:
     offset: float = 0.0
 
 
+AMBIGUOUS = "grad"  # the degree in German, the gon in other languages and on calculators
 _DEGREE = math.pi / 180.0
 _FACTORS: Mapping[str, Mapping[str, float]] = {
     "rad": {
@@ -43,6 +44,7 @@ _FACTORS: Mapping[str, Mapping[str, float]] = {
     "rad_s": {"rad/s": 1.0, "rad_s": 1.0, "mrad/s": 1e-3, "deg/s": _DEGREE, "°/s": _DEGREE, "deg_s": _DEGREE},
     "m_s": {symbol: float(factor) for symbol, factor in UNITS["m_s"].items()},
     "degC": dict.fromkeys(("degC", "°C", "C", "Celsius"), 1.0),
+    AMBIGUOUS: {"grad": 1.0, "grd": 1.0},
 }
 _KELVIN, _FAHRENHEIT = ("K", "Kelvin"), ("degF", "°F", "F")
 
@@ -55,7 +57,7 @@ _BY_SYMBOL: Mapping[str, Unit] = MappingProxyType(
     | {symbol.casefold(): Unit(symbol, "degC", 1.0, -273.15) for symbol in _KELVIN}
     | {symbol.casefold(): Unit(symbol, "degC", 5.0 / 9.0, -160.0 / 9.0) for symbol in _FAHRENHEIT}
 )
-# German nouns have a capital: "Grad" is a degree. As "grad" or "GRAD" other languages and calculators write the gon.
+# German nouns have a capital.
 _GERMAN_DEGREE = {symbol: Unit(symbol, "rad", _DEGREE) for symbol in ("Grad", "Grd")}
 _PLAIN_NUMBER = ("", "1", "-", "—")  # what stands where a column has no unit
 
@@ -70,23 +72,14 @@ _SUFFIXED = re.compile(r"(.+?)_(rad_s|deg_s|rad|mrad|deg|m|cm|mm|um|s|ms|us|ns|k
 
 def unit_of(symbol: str) -> Unit | None:
     """The unit of this symbol, in whatever case; None where it is none that is known."""
-    german = _GERMAN_DEGREE.get(symbol.strip())
-    return german or _BY_SYMBOL.get(symbol.strip().casefold())  # µ (micro) and μ (mu) fold alike
-
-
-def is_degree_or_gon(symbol: str) -> bool:
-    """Whether a unit is a degree to some programs and a gon to others: `grad`, `GRAD`."""
-    return unit_of(symbol) is None and symbol.strip().capitalize() in _GERMAN_DEGREE
-
-
-def is_unit(symbol: str) -> bool:
-    """Whether a text is a unit, be it an ambiguous one."""
-    return unit_of(symbol) is not None or is_degree_or_gon(symbol)
+    # µ (micro) and μ (mu) fold alike
+    return _GERMAN_DEGREE.get(symbol.strip()) or _BY_SYMBOL.get(symbol.strip().casefold())
 
 
 def symbols(suffix: str) -> tuple[str, ...]:
     """What may be written for a quantity whose SI columns end with `suffix`; the usual ones first."""
     usual = {"rad": ("deg", "rad"), "m": ("mm", "m"), "s": ("s", "ms", "us", "ns"), "degC": ("degC", "K", "degF")}
+    usual[AMBIGUOUS] = ("deg", "gon")
     return usual.get(suffix, tuple(_FACTORS.get(suffix, ())))
 
 
@@ -100,7 +93,7 @@ def split_heading(heading: str) -> tuple[str, str]:
         return match[1].strip(), "" if match[2].strip() in _PLAIN_NUMBER else match[2].strip()
     for form in (_IN_PARENTHESES, _BEHIND_IN, _BEHIND_SPACE, _BEHIND_STROKE, _SUFFIXED):
         match = form.fullmatch(heading)
-        if match and match[1].strip() and is_unit(match[2]):
+        if match and match[1].strip() and unit_of(match[2]):
             return match[1].strip(), match[2].strip()
     return heading.strip(), ""
 

@@ -8,7 +8,6 @@ Decimals are a point or a comma, decided once for the whole file and refused whe
 import csv
 import importlib
 import io
-import itertools
 import math
 import re
 import zipfile
@@ -22,7 +21,7 @@ from typing import Any
 from acquisition.recording.errors import SamplesError, shown
 from acquisition.recording.files.bounds import UNPACKED_BYTES
 from acquisition.recording.files.table_file import check_cells, parquet_table, table_bytes
-from acquisition.recording.foreign.heading_units import is_unit
+from acquisition.recording.foreign.heading_units import unit_of
 
 SUFFIXES = (".xlsx", ".xlsm", ".csv", ".tsv", ".txt", ".parquet")
 SEPARATORS = (";", "\t", ",")  # in this order: a table with decimal commas has them inside its cells
@@ -344,8 +343,7 @@ def _possible_headings(rows: Sequence[tuple[int, Sequence[Raw]]]) -> Iterator[in
     for at, (_, cells) in enumerate(rows[:TITLE_ROWS]):
         if len(_texts(cells)) < 2 or any(map(_is_missing, cells)) or _numbers(cells) or _is_unit_row(cells):
             continue
-        below = itertools.islice((c for _, c in itertools.islice(rows, at + 1, None) if any(_filled(c))), 2)
-        if any(len(_numbers(c)) >= 2 for c in below):
+        if any(len(_numbers(below)) >= 2 for _, below in rows[at + 1 : at + 3]):
             yield at
 
 
@@ -356,9 +354,8 @@ def _refuse_two_headings(where: str, rows: Sequence[tuple[int, Sequence[Raw]]], 
         both = _texts(rows[first][1]) & _texts(rows[second][1])
         if any(len(_numbers(cells) & both) >= 2 for _, cells in rows[first + 1 : second]):
             raise SamplesError(
-                f"{where}: row {rows[first][0]} and row {rows[second][0]} may both be the headings, and numbers stand "
-                f"between them; save each table as a file of its own, or choose one: --header-row {rows[second][0]} "
-                "leaves out the rows above it"
+                f"{where}: row {rows[first][0]} and row {rows[second][0]} may both be the headings, with numbers "
+                f"between them; save each table alone, or take the lower one alone: --header-row {rows[second][0]}"
             )
 
 
@@ -367,7 +364,7 @@ def _is_unit_row(cells: Sequence[Raw]) -> bool:
     texts = [cell.strip("[]()") for cell in cells if isinstance(cell, str)]
     if len(texts) < sum(_filled(cells)) or _numbers(cells):
         return False
-    return 2 * sum(1 for text in texts if is_unit(text)) > len(texts)
+    return 2 * sum(1 for text in texts if unit_of(text)) > len(texts)
 
 
 def _decimal(where: str, lines: Sequence[int], rows: Iterable[tuple[Raw, ...]]) -> str:

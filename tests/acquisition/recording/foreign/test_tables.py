@@ -23,7 +23,7 @@ from acquisition.recording.foreign import (
 from acquisition.recording.foreign.heading_units import split_heading
 from tests.acquisition.recording.foreign.conftest import JOINTS, session, write_csv, write_xlsx
 
-DEGREES = {"deg": np.degrees(1.0), "rad": 1.0, "mrad": 1e3, "°": np.degrees(1.0)}
+DEGREES = {"deg": np.degrees(1.0), "rad": 1.0, "mrad": 1e3, "gon": 200.0 / np.pi, "°": np.degrees(1.0)}
 LENGTHS = {"mm": 1e3, "m": 1.0, "µm": 1e6, "cm": 1e2}
 NAMES = {"A": "A{}", "J": "J{}", "Joint": "Joint {}", "axis": "axis_{}", "q": "q{}", "RTDE": "actual_q_{}"}
 FORMS = ("{} [{}]", "{}/{}", "{} ({})", "{} in {}", "{} {}")
@@ -282,16 +282,12 @@ def test_names_of_makers_are_known_with_their_units(tmp_path, rig_source, names,
 
 @pytest.mark.parametrize("heading", ["A{} [grad]", "A{} (GRAD)", "A{}/grad", "A{} [grd]", "A{}"])
 def test_degrees_and_gon_are_not_confused(tmp_path, rig_source, heading):
-    headings, rows = [*(heading.format(i) for i in range(1, 7)), "X [mm]", "Y [mm]", "Z [mm]"], session(rows=20)
+    headings, rows = [*(heading.format(i) for i in range(1, 7)), *HEADINGS[6:]], table_of(session(rows=20), "deg", "mm")
     units = None if heading != "A{}" else [*["GRAD"] * 6, *["mm"] * 3]
-    message = refused(tmp_path, rig_source, headings, table_of(rows, "deg", "mm"), units=units)
+    message = refused(tmp_path, rig_source, headings, rows, units=units)
     assert "write deg or gon" in message
     assert "[deg|gon] = q" in message
-    rows["q"] *= 200.0 / 180.0  # 400 gon are a turn
-    path = write_csv(tmp_path / "gon.csv", [*(f"A{i} [gon]" for i in range(1, 7)), *"XYZ"], table_of(rows, "deg", "mm"))
-    close(imported(path, rig_source, "X Y Z [mm] = position")[1], session(rows=20))
-    stated = refused_by(lambda: imported(path, rig_source, "A1..A6 [grad] = q, X Y Z [mm] = position"))
-    assert "use deg, gon" in stated
+    assert "use deg, gon" in refused(tmp_path, rig_source, HEADINGS, rows, "A1..A6 [grad] = q")
 
 
 def test_the_unit_of_a_makers_name_is_held_against_the_values(tmp_path, rig_source):
@@ -322,8 +318,7 @@ def test_a_row_of_headings_that_is_stated_is_taken(tmp_path, rig_source):
 def test_a_restarted_log_with_headings_again_is_refused_and_no_row_is_lost(tmp_path, rig_source):
     rows, path = table_of(session(rows=30), "deg", "mm"), tmp_path / "lab.csv"
     write_csv(path, HEADINGS, [*rows[:10], [*HEADINGS, "temp_arm [degC]"], *((*row, 20.5) for row in rows[10:])])
-    message = refused_by(lambda: read_sheet(path))
-    assert "lab.csv: row 1 and row 12 may both be the headings" in message
+    assert "lab.csv: row 1 and row 12 may both be the headings" in (message := refused_by(lambda: read_sheet(path)))
     assert "--header-row 12" in message
     assert len(read_sheet(path, header_row=12).rows) == 20
     write_csv(path, [*HEADINGS, "temp_arm [degC]"], [*((*row, 20.5) for row in rows[:10]), HEADINGS, *rows[10:]])
