@@ -43,9 +43,10 @@ ARC_END = re.compile(rf"{ARC}{TARGET}", LINES)
 OTHER = re.compile(rf"{GOES}_REL\b", LINES)
 ROUTINE = re.compile(r"^[ \t]*(?:GLOBAL\s+)?DEF(?:FCT\s+\w+)?\s+(?P<name>\w+)\s*\((?P<parameters>[^)]*)", LINES)
 WAY = re.compile(
-    r"^[ \t]*(?:(?P<loop>FOR|WHILE|REPEAT|LOOP)|(?P<if>IF|SWITCH)|(?P<scope>(?:PTP_)?SPLINE)|(?P<else>CASE)"
-    r"|(?P<otherwise>ELSE|DEFAULT)|(?P<end>END(?:FOR|WHILE|LOOP|IF|SWITCH|SPLINE|FCT)?|UNTIL)"
-    r"|(?P<return>RETURN)|(?P<break>EXIT))\b",
+    r"^[ \t]*(?:(?P<while>WHILE\b[^\n]*)|(?P<loop>FOR\b[^\n]*|REPEAT|LOOP)|(?P<if>IF\b.*?(?:\bTHEN|$)|SWITCH\b[^\n]*)"
+    r"|(?P<scope>(?:PTP_)?SPLINE)|(?P<else>CASE)|(?P<otherwise>ELSE|DEFAULT)"
+    r"|(?P<end>END(?:FOR|WHILE|LOOP|IF|SWITCH|SPLINE|FCT)?|UNTIL\b[^\n]*)|(?P<return>RETURN\b[^\n]*)|(?P<break>EXIT))"
+    r"(?!\w)",
     LINES,
 )
 JUMP = re.compile(r"\bGOTO[ \t]+(?P<goto>\w+)|^[ \t]*(?P<label>[A-Z]\w*)[ \t]*:", LINES)
@@ -176,7 +177,7 @@ def _places(code: str) -> tuple[literal.Places, dict[str, Used]]:
         if literal.line_start(code, match.start()) not in alone:
             words = words_of(re.sub(r"\{.*", "", match["value"] or match["number"] or ""))
             for events, pose in zip(sets, poses(match), strict=True):
-                events += [Event(match.start(), "set", "", pose, words)] if pose else []
+                events += [Event(match.end(), "set", "", pose, words)] if pose else []
     base_at, tool_at = (set_above([*ways, *sets[k]], nothing, word) for k, word in enumerate(("base", "tool")))
 
     def places(at: int) -> Used:

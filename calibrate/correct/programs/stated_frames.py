@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from calibrate.correct.programs.literal import Literal, NamedPose, Targets, last_before, line_of
+from calibrate.correct.programs.literal import LONGEST_MOVE, Literal, NamedPose, Targets, last_before, line_of
 from calibrate.errors import DataError
 
 Floats = NDArray[np.float64]
@@ -125,9 +125,9 @@ def _listed(names: set[str]) -> str:
 class Event:
     """A place where a program sets a frame (or a tool, which is followed by itself), or branches.
 
-    `kind`: routine, call, started (as a thread or an interrupt), set, if, loop, scope, else (the next branch),
-    otherwise (the last one), break, return, goto, label, end (of the innermost block or routine; of a routine it
-    becomes "left").
+    `kind`: routine, call, started (as a thread or an interrupt), set, if, loop, scope, else (the next branch), tested
+    (behind the condition of a loop or branch), otherwise (the last branch), break, return, goto, label, end (of the
+    innermost block or routine; of a routine it becomes "left").
     """
 
     at: int
@@ -152,15 +152,31 @@ def routines_of(
 ) -> list[Event]:
     """Where routines begin, branch and are called; `caller`: with what all but the first are entered from outside."""
     begun = list(begins.finditer(code))
-    events = [Event(match.start(), match.lastgroup or "") for match in branches.finditer(code)]
+    events = list[Event]()
+    for match in branches.finditer(code):  # calls in a condition, and in what is returned, come first
+        kind = match.lastgroup or ""
+        if kind in ("while", "else"):  # has a condition of its own, which is tested each time
+            events.append(Event(match.start(), "loop" if kind == "while" else kind))
+            kind = "tested"
+        events.append(Event(match.end(), kind))
     for k, match in enumerate(begun):
         words = words_of(match["parameters"])
         events.append(Event(match.start("name"), "routine", match["name"].lower(), caller if k else None, words))
-    names, own = {event.name for event in events}, {event.at for event in events}
+    names, own = {event.name for event in events}, {match.start("name") for match in begun}
     for match in CALL.finditer(code):
         if (name := match["name"].lower()) in names and match.start("name") not in own:
-            events.append(Event(match.start("name"), "started" if match["started"] else "call", name))
+            events.append(Event(closed(code, match.end() - 1), "started" if match["started"] else "call", name))
     return events
+
+
+def closed(code: str, at: int) -> int:
+    """Where the parenthesis that opens at a place is closed: calls in it come first."""
+    depth = 0
+    for k in range(at, min(len(code), at + LONGEST_MOVE)):
+        depth += (code[k] == "(") - (code[k] == ")")
+        if depth == 0:
+            return k
+    return at
 
 
 def words_of(text: str) -> frozenset[str]:
@@ -221,6 +237,9 @@ class _Flow:
                 if kind == "loop" and not _alike(state, entered):
                     k = begin  # once more, as it is entered from its end
                     continue
+            elif event.kind == "tested" and opened:
+                kind, begin, entered, ways = opened[-1]
+                opened[-1] = (kind, begin, entered if kind == "loop" else state, [state, *ways[1:]])
             elif event.kind in ("else", "otherwise") and opened:
                 ways = opened[-1][3]
                 ways[:] = [*(ways if event.kind == "else" else ways[1:]), state]

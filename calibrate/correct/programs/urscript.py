@@ -10,7 +10,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from calibrate.correct.programs import literal
-from calibrate.correct.programs.stated_frames import CALL, Event, routines_of, set_above, words_of
+from calibrate.correct.programs.stated_frames import CALL, Event, closed, routines_of, set_above, words_of
 from calibrate.correct.rotations import VECTOR
 
 LIST = rf"(?P<pose>p?)\[\s*{literal.NUMBER}(?:\s*,\s*{literal.NUMBER})*\s*\]"
@@ -31,8 +31,8 @@ CHANGED = re.compile(
 )
 ROUTINE = re.compile(r"^[ \t]*(?:def|thread|sec)\s+(?P<name>\w+)\s*\((?P<parameters>[^)]*)", re.MULTILINE)
 WAY = re.compile(
-    r"(?<![\w.])(?:(?P<loop>while)|(?P<if>if)|(?P<else>elif)|(?P<otherwise>else)|(?P<end>end)|(?P<return>return)"
-    r"|(?P<break>break|continue))\b"
+    r"(?<![\w.])(?:(?P<while>while\b[^:]*)|(?P<if>if\b[^:]*)|(?P<else>elif\b[^:]*)|(?P<otherwise>else)|(?P<end>end)"
+    r"|(?P<return>return\b(?:(?!\bend\b)[^\n])*)|(?P<break>break|continue))(?!\w)"
 )
 BUILT_IN = literal.built_in(r"""
     def thread sec if elif while return and or x?or not in run join kill assert halt sleep sync popup textmsg pause
@@ -80,7 +80,8 @@ def _places(code: str) -> literal.Places:
         numbers = [v for _, v in literal.numbers_in(code, *match.span("literal"))] if match["literal"] else []
         line = f"set_tcp of line {literal.line_of(code, match.start())}"
         tool = literal.NamedPose(line, URSCRIPT.frame(numbers) if len(numbers) == 6 else None)
-        events.append(Event(match.start(), "set", "", tool, words_of(match["words"] or "")))
+        words = words_of(match["words"] or "")
+        events.append(Event(closed(code, code.index("(", match.start())), "set", "", tool, words))
     above = set_above(events, literal.NamedPose(), "tool")
     return lambda at: (base, above(at))
 

@@ -178,6 +178,33 @@ def test_a_thread_may_set_the_tool_at_any_moment() -> None:
     assert of_urscript(text) == ["the tool is set in the called routine hand"]
 
 
+CONDITIONS = {  # body after base 1, with check() setting base 2; bases of its moves
+    "else": (f"IF check() THEN\n{POINT}ELSE\n{POINT}ENDIF\n{POINT}", [2.0, 2.0, 2.0]),
+    "case": (f"SWITCH check()\nCASE 1\n{POINT}CASE 2\n{POINT}ENDSWITCH\n{POINT}", [2.0, 2.0, 2.0]),
+    "while": (f"WHILE check()\n{base(1)}{POINT}ENDWHILE\n{base(1)}{POINT}", [1.0, 1.0]),
+    "behind while": (f"WHILE check()\n{base(1)}ENDWHILE\n{POINT}", [None]),
+    "for": (f"FOR i = 1 TO check()\n{POINT}{base(1)}ENDFOR\n{POINT}", [None, None]),
+    "until": (f"REPEAT\n{POINT}UNTIL check() > 1\n{POINT}", [None, None]),
+    "return": (f"other()\n{POINT}END\nDEF other()\nIF a THEN\nRETURN check()\nENDIF\n", [None]),
+    "one call in another": (f"k = other(check())\n{POINT}END\nDEFFCT INT other(n:IN)\n{base(3)}", [3.0]),
+    "what is set": ("$BASE = check()\n" + POINT, ["CHECK()"]),
+}
+
+
+@pytest.mark.parametrize(("body", "bases"), CONDITIONS.values(), ids=CONDITIONS)
+def test_calls_in_a_condition_come_before_its_branches(body: str, bases: list[float | str | None]) -> None:
+    found = of_krl(f"DEF main()\n{base(1)}{body}END\nDEFFCT INT check()\n{base(2)}ENDFCT\n")
+    assert [one if one in bases else None for one in found] == bases
+
+
+def test_calls_in_conditions_of_urscript_come_before_their_branches() -> None:
+    grip = f"def weld():\ndef grip():\n{tcp(2)}end\n{tcp(1)}"
+    assert of_urscript(f"{grip}if grip(): {tcp(3)}else: {MOVEL}end\nend\n") == [2.0]
+    assert of_urscript(f"{grip}if a:\n{MOVEL}elif grip():\n{MOVEL}else:\n{MOVEL}end\nend\n") == [1.0, 2.0, 2.0]
+    says = "the tool is set in a branch or a loop above, or not"
+    assert of_urscript(f"{grip}if a:\nb = 1\nelif grip():\n{tcp(1)}end\n{MOVEL}end\n") == [says]
+
+
 POSE = "{X 1, Y 0, Z 0, A 0, B 0, C 0}"
 
 
