@@ -41,37 +41,44 @@ def lines(data: Path) -> Iterator[str]:
 
 
 def _line(recording: Recording, fold: int, name: str) -> str:
-    block = np.arange(len(recording.samples)) * BLOCKS // len(recording.samples)
-    seen, unseen = np.flatnonzero(block % FOLDS != fold), np.flatnonzero(block % FOLDS == fold)
-    known, asked = (replace(recording, samples=recording.samples.take(rows)) for rows in (seen, unseen))
+    known, asked = apart(recording, fold)
     nominal = 1e6 * identify_session(asked).instruments[0].rms_distance_before_m
-    geometry = _rms_um(_errors_m(session_model(identify_session(known), known), asked))
+    geometry = rms_um(errors_m(session_model(identify_session(known), known), asked))
     before = time.process_time()
     found, file = diagnose_recording(known)
     cpu_s = time.process_time() - before
-    model = _through_a_file(model_of_diagnosis(found, known))
-    physics, own = _rms_um(_errors_m(model, asked)), _errors_m(model, known)
+    model = through_a_file(model_of_diagnosis(found, known))
+    physics, own = rms_um(errors_m(model, asked)), errors_m(model, known)
     mean = ", ".join(f"{1e6 * v:.1f}" for v in np.mean(own, axis=0))
     names = [f"{f.physics} {f.where} {f.confidence:.2f}" for f in file.findings]
-    left = [] if file.unexplained is None else [f"unexplained: {file.unexplained.says.split(';')[0]}"]
+    names += [] if file.unexplained is None else [f"unexplained: {file.unexplained.says.split(';')[0]}"]
     return (
-        f"| `{name}` | {len(seen)}, {len(unseen)} | {fold} | {nominal:.0f} µm | {geometry:.1f} µm | {physics:.1f} µm | "
-        f"{physics / geometry:.3f} | {_rms_um(own):.1f} ({mean}) µm | {cpu_s:.0f} s | {'; '.join([*names, *left])} |"
+        f"| `{name}` | {len(known.samples)}, {len(asked.samples)} | {fold} | {nominal:.0f} µm | {geometry:.1f} µm | "
+        f"{physics:.1f} µm | {physics / geometry:.3f} | {rms_um(own):.1f} ({mean}) µm | {cpu_s:.0f} s | {'; '.join(names)} |"
     )
 
 
-def _through_a_file(model: ModelFile) -> ModelFile:
+def apart(recording: Recording, fold: int) -> tuple[Recording, Recording]:
+    """Rows that are fitted to, and those that are kept away."""
+    block = np.arange(len(recording.samples)) * BLOCKS // len(recording.samples)
+    rows = np.flatnonzero(block % FOLDS != fold), np.flatnonzero(block % FOLDS == fold)
+    known, asked = (replace(recording, samples=recording.samples.take(some)) for some in rows)
+    return known, asked
+
+
+def through_a_file(model: ModelFile) -> ModelFile:
+    """As a user reads it."""
     with tempfile.TemporaryDirectory() as folder:
         write_model(Path(folder) / "model.json", model)
         return read_model(Path(folder) / "model.json")
 
 
-def _errors_m(model: ModelFile, recording: Recording) -> NDArray[np.float64]:
+def errors_m(model: ModelFile, recording: Recording) -> NDArray[np.float64]:
     """(row, 3) measured minus predicted."""
     predicted = predict_with_physics(model, recording.samples, same_session=True).columns
     return np.stack([recording.samples.column(c) - predicted[c] for c in XYZ], axis=1)
 
 
-def _rms_um(errors_m: NDArray[np.float64]) -> float:
+def rms_um(errors_m: NDArray[np.float64]) -> float:
     """Of the distances."""
     return float(1e6 * np.sqrt(np.mean(np.sum(errors_m**2, axis=1))))
