@@ -54,7 +54,8 @@ def _line(recording: Recording, fold: int, name: str) -> str:
     names += [] if file.unexplained is None else [f"unexplained: {file.unexplained.says.split(';')[0]}"]
     return (
         f"| `{name}` | {len(known.samples)}, {len(asked.samples)} | {fold} | {nominal:.0f} µm | {geometry:.1f} µm | "
-        f"{physics:.1f} µm | {physics / geometry:.3f} | {rms_um(own):.1f} ({mean}) µm | {cpu_s:.0f} s | {'; '.join(names)} |"
+        f"{physics:.1f} µm | {physics / geometry:.3f} | {rms_um(own):.1f} ({mean}) µm | {cpu_s:.0f} s | "
+        f"{'; '.join(names)} |"
     )
 
 
