@@ -162,13 +162,13 @@ def test_poses_that_tell_rivals_apart_are_chosen_beside_a_model(soft, moved_rad)
 
 
 def best_of(state, physics, where):
-    """The state with the best term of a name."""
+    """The state with the best term of a name, its drivers at its own values, as a diagnosis hands it over."""
     bench = Bench(state)
     gain = bench.scores.gain
     terms = [bench.menu.terms[entry.term] for entry in bench.menu.entries]
     mine = [e for e, term in enumerate(terms) if (term.physics, term.port.where) == (physics, where)]
     best = max(mine, key=lambda e: gain[e])
-    return state.refitted([refined(bench, terms[best], bench.menu.entries[best].inner)])
+    return state.refitted([refined(bench, terms[best], bench.menu.entries[best].inner)]).renewed()
 
 
 def rivals_of(state):
