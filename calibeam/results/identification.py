@@ -13,10 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.recording import Recording, readings_sha256
-from acquisition.recording.rig import Rig, rig_sha256
+from acquisition.recording.rig import ArmModel, Rig, rig_sha256
 from acquisition.recording.samples import measured_sha256
 from calibeam.outcome import PartialResult
+from calibrate.converted_rig import rig_in_model
 from calibrate.errors import DataError
+from calibrate.export.dh_csv import dh_table_of
 from calibrate.fit import Status
 from calibrate.fit_plan import DEFAULT, FitPlan, parse_plan, read_plan, zeros_only_text
 from calibrate.identification.estimates import Estimate
@@ -97,6 +99,10 @@ def session_model(result: Identification, recording: Recording, planned: Planned
     identity, samples = RigIdentity(rig.name, rig_sha256(text), text), recording.samples
     hashes = {"readings_sha256": readings_sha256(samples), "measured_sha256": measured_sha256(samples)}
     model = msgspec.structs.replace(record_of(result, identity, arm_model, told.text), **hashes)
+    if arm_model == ArmModel.LOCAL_POE.value and model.covariance is not None:
+        in_model = rig_in_model(rig, ArmModel.LOCAL_POE)
+        found = dh_table_of(in_model, model, result.parameters, result.identifiability)
+        model = msgspec.structs.replace(model, dh_table=found)
     left = [(i.name, i.rows[:, 0], i.misfit) for i in result.instruments if i.rows.shape[1] == 1]
     return as_fitted(model, samples, left)
 

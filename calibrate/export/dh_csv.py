@@ -19,7 +19,7 @@ from calibrate.arms.table import NEAR_PARALLEL_SINE
 from calibrate.export.identified import NO_NUMBER, IdentifiedArm, identified_arm
 from calibrate.identifiability import STRUCTURAL, Identifiability, combinations_of
 from calibrate.identification.estimates import ONLY_BELIEVED
-from calibrate.model_file import ModelParameter
+from calibrate.model_file import ModelFile, ModelParameter
 from calibrate.parameters import Parameter
 
 Floats = NDArray[np.float64]
@@ -76,28 +76,30 @@ SMALL = 1e-6  # of a scaled direction: rounding of the differences leaves 1e-9
 ONLY_PRIOR = 0.9  # of the sigma that the tolerances alone leave: beyond, the data taught nothing
 
 
-def dh_arm(
-    rig: Rig, values: Mapping[str, float], free: Sequence[Parameter], seen: Identifiability, covariance: Floats
-) -> IdentifiedArm:
-    """The arm by its standard D-H table: nominal numbers, corrections, and which of these the data determine.
+def dh_arm(rig: Rig, values: Mapping[str, float], stated: Sequence[ModelParameter]) -> IdentifiedArm:
+    """The arm of these corrections by its standard D-H table; `stated`: what the data determine of that table."""
+    found = _corrections(rig, values)
+    in_dh = replace(rig, arm=replace(convert(rig.arm, ArmModel.DH).arm, make=rig.arm.make))
+    return identified_arm(in_dh, dict(zip(_names(rig), found.tolist(), strict=True)), stated=stated)
 
-    `values` are corrections of arm parameters by name; `free` are the parameters of `seen`, with their covariance.
+
+def dh_table_of(
+    rig: Rig, model: ModelFile, parameters: Sequence[Parameter], seen: Identifiability
+) -> tuple[ModelParameter, ...]:
+    """Corrections of the standard D-H table of an arm of poses, or why the data determine none.
+
+    `parameters` are those of the fit; `seen` is their identifiability without what is only assumed.
     """
-    drawn = convert(rig.arm, ArmModel.DH)
-    nominal = np.array(dh_numbers(drawn))
-
-    def corrections(of: Mapping[str, float]) -> Floats:
-        apart = np.array(dh_numbers(convert(rig.arm, ArmModel.DH, of))) - nominal
-        apart[:, [0, 3]] = np.remainder(apart[:, [0, 3]] + np.pi, 2.0 * np.pi) - np.pi
-        return apart.ravel()
-
-    names = [name.format(i) for i in range(1, rig.n_joints + 1) for name in NAMES]
-    found, own = corrections(values), {p.name for p in arm_of(rig).parameters}
-    J = np.zeros((len(names), len(free)))
+    values = {p.name: model.chain.get(p.name, 0.0) for p in arm_of(rig).parameters}
+    free = [p for p in parameters if p.free]
+    covariance = _covariance(model, [p.name for p in free])
+    names, nominal = _names(rig), np.array(dh_numbers(convert(rig.arm, ArmModel.DH)))
+    found, J = _corrections(rig, values), np.zeros((len(names), len(free)))
+    own = set(values)
     for k, name in enumerate(p.name for p in free):
         if name in own:
-            up, down = ({**values, name: values.get(name, 0.0) + step} for step in (STEP, -STEP))
-            J[:, k] = (corrections(up) - corrections(down)) / (2.0 * STEP)
+            up, down = ({**values, name: values[name] + step} for step in (STEP, -STEP))
+            J[:, k] = (_corrections(rig, up) - _corrections(rig, down)) / (2.0 * STEP)
     together = _together(names, J, [p for p in free if p.name not in own], free, seen)
     tilted = np.abs(np.sin(nominal[:, 3])) < NEAR_PARALLEL_SINE
     tilted[-1] = False  # nothing turns behind it
@@ -114,8 +116,30 @@ def dh_arm(
         numbers = (None, None) if why else (float(found[i]), float(np.hypot(sigma, pulled[i])))
         if not name.endswith("tilt") or tilted[i // len(NAMES)]:
             stated.append(ModelParameter(name, unit, *numbers, why))
-    in_dh = replace(rig, arm=replace(drawn.arm, make=rig.arm.make))
-    return identified_arm(in_dh, dict(zip(names, found.tolist(), strict=True)), stated=stated)
+    return tuple(stated)
+
+
+def _names(rig: Rig) -> list[str]:
+    return [name.format(i) for i in range(1, rig.n_joints + 1) for name in NAMES]
+
+
+def _corrections(rig: Rig, values: Mapping[str, float]) -> Floats:
+    """(number,) of the table: calibrated less nominal."""
+    calibrated, nominal = (np.array(dh_numbers(convert(rig.arm, ArmModel.DH, of))) for of in (values, {}))
+    apart = calibrated - nominal
+    apart[:, [0, 3]] = np.remainder(apart[:, [0, 3]] + np.pi, 2.0 * np.pi) - np.pi
+    return apart.ravel()
+
+
+def _covariance(model: ModelFile, names: list[str]) -> Floats:
+    """(name, name) of free parameters, zero for those that the fit held; nan where the model has none."""
+    if (known := model.covariance) is None:
+        return np.full((len(names),) * 2, np.nan)
+    at, stated = [names.index(name) for name in known.names], {p.name: p.sigma for p in model.parameters if p.sigma}
+    out = np.zeros((len(names),) * 2)
+    out[np.ix_(at, at)] = known.rows
+    wider = [stated[n] / np.sqrt(known.rows[k][k]) for k, n in enumerate(known.names) if n in stated]
+    return out * np.median(wider or [1.0]) ** 2  # for noise known from few readings, as in these sigmas
 
 
 def _together(

@@ -48,6 +48,7 @@ class IdentifiedArm:
     zeros: tuple[AxisOffset, ...] = ()
     compliance_rad_nm: Mapping[int, float] = field(default_factory=dict[int, float])  # joint from 1: linear ones
     stated: tuple[ModelParameter, ...] = ()  # what the model holds of each correction
+    dh_table: tuple[ModelParameter, ...] = ()  # and, of an arm of poses, of those of its standard D-H table
 
     @property
     def sign(self) -> str:

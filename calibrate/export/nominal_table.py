@@ -4,7 +4,7 @@ Axes are angles at a reading of zero, in the senses and couplings of the control
 r + value. Links are the numbers of the arm model. A correction of a D-H table adds to the drawn number. Of a local-POE
 arm, x, y, z are those of the next axis seen in its own frame, to which the correction adds, and turns are separated
 from the drawn part, so they are drawn as zero. Where the recording determines no number, the reason stands in its
-place.
+place. An arm that was fitted as poses has the rows of its D-H table, where the model holds what is determined of it.
 """
 
 import math
@@ -16,6 +16,7 @@ from scipy.spatial.transform import Rotation
 
 from acquisition.recording.rig import ArmModel, Joint, Make, Pose
 from calibrate.arms.coupled_readings import by_reading
+from calibrate.export.dh_csv import dh_arm
 from calibrate.export.identified import NO_NUMBER, IdentifiedArm
 from calibrate.identifiability import plainly
 from calibrate.report.not_determined import in_plain_words
@@ -27,6 +28,7 @@ DEGREES, MILLIMETRES = (math.degrees(1.0), "deg"), (1e3, "mm")
 DH = (("offset", "d_m"), ("length", "a_m"), ("twist", "alpha_rad"), ("tilt", None))  # correction, drawn number
 POE = ("x", "y", "z", "roll", "pitch", "yaw")
 UNIT = {"deg": "°", "mm": "mm"}
+NO_DH = "for its D-H table: calibeam identify REC --export table"
 NOMINAL_DECIMALS = 2  # of a nominal value beside which there is no sigma
 HEADING = ("parameter", "unit", "nominal", "correction", "sigma", "calibrated", "not_determined_because")
 
@@ -46,6 +48,7 @@ class NominalRow:
 
 def nominal_table(arm: IdentifiedArm) -> tuple[NominalRow, ...]:
     """Axes first, then links; numbers that the arm does not have as parameters are left out."""
+    arm = dh_arm(arm.rig, arm.corrections, arm.dh_table) if arm.dh_table else arm
     return (*_axes(arm), *_links(arm))
 
 
@@ -54,7 +57,7 @@ def nominal_table_text(arm: IdentifiedArm) -> str:
     lines = [
         "# Nominal, correction, calibrated = nominal + correction, identified by calibeam; degrees and millimetres",
         "# axes: the angle at a reading of zero, in the robot's own signs: an axis that reads r stands at r + angle",
-        f"# links: the numbers of the arm model '{arm.rig.arm.model.value}', as counted by the controller",
+        f"# links: {_what_links_are(arm)}",
         *(f"# {says}" for says in arm.not_carried),
         ",".join(HEADING),
     ]
@@ -62,6 +65,13 @@ def nominal_table_text(arm: IdentifiedArm) -> str:
         numbers = (to_sigma(value, row.sigma) for value in (row.correction, row.sigma, row.calibrated))
         lines.append(",".join((row.parameter, row.unit, repr(row.nominal), *numbers, quoted(row.why))))
     return "\n".join(lines) + "\n"
+
+
+def _what_links_are(arm: IdentifiedArm) -> str:
+    if arm.dh_table:
+        return "the standard Denavit-Hartenberg table: offset d, length a, twist alpha, Hayati's tilt beta"
+    says = f"the numbers of the arm model '{arm.rig.arm.model.value}', as counted by the controller"
+    return f"{says}; {NO_DH}" if arm.rig.arm.model is ArmModel.LOCAL_POE and arm.stated else says
 
 
 def cells(row: NominalRow) -> tuple[str, ...]:

@@ -19,7 +19,7 @@ from calibrate.arms.model import KinematicModel
 from calibrate.converted_rig import rig_in_model
 from calibrate.dual_psd_rig import dual_psd_chain
 from calibrate.errors import DataError
-from calibrate.export.dh_csv import dh_arm
+from calibrate.export.dh_csv import dh_arm, dh_table_of
 from calibrate.export.identified import IdentifiedArm, identified_arm
 from calibrate.fit import solve
 from calibrate.fit_plan import DEFAULT, parse_plan
@@ -190,16 +190,10 @@ class SessionEvidence:
         if not poses or model.effects:
             listed = [p for p in model.parameters if not poses or p.name.startswith("joint")]
             return identified_arm(rig, values, stated=listed, covariance=model.covariance)
-        free = [i for i, p in enumerate(self.parameters) if p.free]
-        covariance, stated = np.full((len(free),) * 2, np.nan), {p.name: p.sigma for p in model.parameters if p.sigma}
-        if (known := model.covariance) is not None:  # its names are the free ones less those that the fit held
-            at = [k for k, i in enumerate(free) if self.parameters[i].name in known.names]
-            covariance = np.zeros_like(covariance)
-            covariance[np.ix_(at, at)] = known.rows
-            wider = [stated[n] / np.sqrt(known.rows[k][k]) for k, n in enumerate(known.names) if n in stated]
-            covariance *= np.median(wider or [1.0]) ** 2  # for noise known from few readings, as in these sigmas
+        if model.dh_table:
+            return dh_arm(rig, values, model.dh_table)
         seen = analyse(self.problem.jacobian(self.theta), without_assumed(self.parameters))
-        return dh_arm(rig, values, [self.parameters[i] for i in free], seen, covariance)
+        return dh_arm(rig, values, dh_table_of(rig, model, self.parameters, seen))
 
     @property
     def left_out(self) -> int:

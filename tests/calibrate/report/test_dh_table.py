@@ -1,14 +1,16 @@
 """The D-H table of an arm of poses: what the data determine lies within its sigma of the axes of the emulated arm."""
 
+import csv
 import re
 
 import numpy as np
 import pytest
+from msgspec.structs import replace
 
 from acquisition.recording import read
 from calibeam.cli import run
 from calibrate.export.nominal_table import cells, nominal_table
-from calibrate.model_file import read_model
+from calibrate.model_file import read_model, write_model
 from calibrate.report.sections.parameter_tables import table_part
 from calibrate.report.session_evidence import session_evidence
 
@@ -51,6 +53,27 @@ def test_lengths_and_twists_are_those_between_the_axes_of_the_real_arm(identifie
             assert abs(abs(twist.calibrated) - np.degrees(angle_rad)) < 4.0 * twist.sigma < 0.03
     away = [row for name, row in rows.items() if name.startswith("link") and row.correction is not None]
     assert sum(abs(row.correction) > 4.0 * row.sigma for row in away) > 5  # the nominal arm is another one
+
+
+def test_the_exported_table_has_the_rows_of_the_report_or_names_the_command(identified, tmp_path):
+    at = identified[0]
+    model, out = read_model(at / "model.json"), tmp_path / "arm.csv"
+    assert run(["export-model", str(at / "model.json"), "--to", "table", "--out", str(out)]) == 0
+    lines = out.read_text(encoding="utf-8").splitlines()
+    rows = list(csv.DictReader(line for line in lines if not line.startswith("#")))
+    without_table = session_evidence(read(at / "session"), replace(model, dh_table=()))
+    for row, shown in zip(rows, nominal_table(without_table.calibrated_arm), strict=True):
+        assert (row["parameter"], row["not_determined_because"]) == (shown.parameter, shown.why)
+        if shown.correction is None:
+            assert (row["correction"], row["sigma"], row["calibrated"]) == ("", "", "")
+            assert shown.why
+        else:
+            assert float(row["calibrated"]) == pytest.approx(shown.calibrated, abs=0.1 * shown.sigma)
+            assert float(row["sigma"]) == pytest.approx(shown.sigma, rel=0.06)
+    assert sum(row["correction"] != "" for row in rows) >= 15
+    write_model(tmp_path / "older.json", replace(model, dh_table=()))
+    assert run(["export-model", str(tmp_path / "older.json"), "--to", "table", "--out", str(out), "--force"]) == 0
+    assert "calibeam identify REC --export table" in out.read_text(encoding="utf-8")
 
 
 def test_what_no_tracker_of_unknown_place_shows_has_a_reason_and_no_number(identified):
