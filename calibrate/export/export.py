@@ -24,6 +24,7 @@ from calibrate.export.mastering import (
     fanuc_mastering_text,
     kuka_mastering_text,
     refused,
+    without_ratio,
 )
 from calibrate.export.matlab import matlab_text
 from calibrate.export.mjcf import mjcf_text
@@ -162,6 +163,8 @@ def export_model(path: Path, rig: Rig, model: ModelFile, form: ExportForm) -> tu
     with_links = any(name.startswith("link") and value != 0.0 for name, value in model.chain.items())
     if form.offsets:
         says = (*_beside_offsets(model, with_links=with_links), *says)
+    if form.text is abb_moc_text:
+        says = (*says, *without_ratio(rig))
     compliance = {int(e.where.removeprefix("joint").split(".")[0]): c for e, c in soft.values()}
     arm = identified_arm(
         rig, corrections(model), model.about.get("tool"), says, model.parameters, compliance, model.covariance

@@ -8,10 +8,11 @@ entered and what could not be tried: docs/controllers.
 import math
 from collections.abc import Callable
 
-from calibrate.errors import DataError
+from acquisition.recording.rig import Rig
 from calibrate.export.identified import NO_NUMBER, AxisOffset, IdentifiedArm
 from calibrate.export.nominal_table import quoted, to_sigma
 
+NO_RATIO = "no gear_ratio in the rig file"
 CLEAR = 2.0  # sigmas: an offset that is less than this is no better than none
 EXPLAINED = (
     "true angle = reading + offset, in the robot's own signs",
@@ -33,23 +34,32 @@ def fanuc_mastering_text(arm: IdentifiedArm) -> str:
 
 
 def abb_moc_text(arm: IdentifiedArm) -> str:
-    """Degrees and motor radians. DataError for a rig without gear ratios."""
+    """Degrees and motor radians, these empty for axes without a gear ratio."""
     ratios = {i: joint.gear_ratio for i, joint in enumerate(arm.rig.arm.joints, start=1)}
-    missing = [i for i, ratio in ratios.items() if ratio is None]
-    if missing:
-        raise DataError(f"rig {arm.rig.name}: joint {missing[0]} has no gear_ratio; state it in [[arm.joint]]")
-    return _table(arm, ABB, "rob1_", (("offset_deg", _degrees), ("motor_rad", lambda joint: ratios[joint] or 1.0)))
+    return _table(arm, ABB, "rob1_", (("offset_deg", _degrees), ("motor_rad", lambda joint: ratios[joint])))
 
 
-def _table(arm: IdentifiedArm, title: str, axis: str, columns: tuple[tuple[str, Callable[[int], float]], ...]) -> str:
+def without_ratio(rig: Rig) -> tuple[str, ...]:
+    """Which axes have no motor angles, and what to do about it; nothing where every joint has its ratio."""
+    missing = [str(i) for i, joint in enumerate(rig.arm.joints, start=1) if joint.gear_ratio is None]
+    says = (
+        f"motor_rad is empty for axes {', '.join(missing)}: rig {rig.name} has no gear_ratio for them; take the "
+        "transmission of each axis from the controller's moc.cfg, state its size as gear_ratio in [[arm.joint]], and "
+        "identify again"
+    )
+    return (says,) if missing else ()
+
+
+def _table(
+    arm: IdentifiedArm, title: str, axis: str, columns: tuple[tuple[str, Callable[[int], float | None]], ...]
+) -> str:
     lines = [f"# {says}" for says in (title, *EXPLAINED, *arm.not_carried)]
     lines.append(",".join(("axis", *(name for name, _ in columns), "sigma_deg", "not_entered_because")))
     for zero in arm.zeros:
         why, sigma = refused(zero), zero.sigma_rad
-        numbers = [
-            to_sigma(None if why else scale(zero.joint) * zero.value_rad, sigma and scale(zero.joint) * sigma)
-            for _, scale in columns
-        ]
+        scales = [scale(zero.joint) for _, scale in columns]
+        numbers = ["" if why or k is None else to_sigma(k * zero.value_rad, sigma and k * sigma) for k in scales]
+        why = why or (NO_RATIO if None in scales else "")
         sigma_deg = None if sigma is None else math.degrees(sigma)
         lines.append(",".join((f"{axis}{zero.joint}", *numbers, to_sigma(sigma_deg, sigma_deg), quoted(why))))
     return "\n".join(lines) + "\n"

@@ -191,7 +191,6 @@ def test_motor_angles_are_those_of_the_gear(tmp_path):
     [
         ("kuka", "ur-calibration", "ur-calibration is for arms of make 'ur', and the make of this one is 'kuka'"),
         ("ur", "kuka-mastering", "for arms of make 'kuka'"),
-        ("abb", "abb-moc", "joint 1 has no gear_ratio"),
         ("rob", "json", "make"),
     ],
 )

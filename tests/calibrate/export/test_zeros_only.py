@@ -6,7 +6,9 @@ import re
 import numpy as np
 import pytest
 
+from acquisition.recording.rig import parse_rig
 from calibeam.cli import run
+from calibrate.export.export import export_model, form_named
 from calibrate.model_file import read_model
 
 from .tracked import HIDDEN_DEG, SIGMA_M, tracked
@@ -34,7 +36,8 @@ def mastered(tmp_path, name, form, **drawn):
 
 
 @pytest.mark.parametrize(
-    ("name", "form"), [("kuka-kr6-r900", "kuka-mastering"), ("fanuc-lrmate-200id", "fanuc-mastering")]
+    ("name", "form"),
+    [("kuka-kr6-r900", "kuka-mastering"), ("fanuc-lrmate-200id", "fanuc-mastering"), ("abb-irb120", "abb-moc")],
 )
 def test_the_offsets_of_the_table_are_those_hidden_in_the_readings(tmp_path, name, form):
     out, rows, comments = mastered(tmp_path, name, form)
@@ -53,6 +56,22 @@ def test_the_offsets_of_the_table_are_those_hidden_in_the_readings(tmp_path, nam
         assert 0.7 * noise_um < calibrated < 1.6 * noise_um
         assert nominal > 300.0
     assert not [name for name, value in read_model(out).chain.items() if name.startswith("link") and value != 0.0]
+
+
+def test_motor_angles_without_a_gear_ratio_are_empty_and_the_remedy_is_named(tmp_path, capsys):
+    """The same offsets with ratios of this test's own: motor angle = ratio times angle of the axis."""
+    out, rows, comments = mastered(tmp_path, "abb-irb120", "abb-moc")
+    assert {row["motor_rad"] for row in rows} == {""}
+    assert {row["not_entered_because"] for row in rows[1:5]} == {"no gear_ratio in the rig file"}
+    for text in (" ".join(capsys.readouterr().out.split()), "\n".join(comments)):
+        assert "motor_rad is empty for axes 1, 2, 3, 4, 5, 6: rig abb-irb120 has no gear_ratio for them" in text
+    known = read_model(out)
+    geared = known.rig.text.replace("[[arm.joint]]", "[[arm.joint]]\ngear_ratio = 80.0", 3)
+    export_model(tmp_path / "geared.csv", parse_rig(geared, "rig.toml"), known, form_named("abb-moc"))
+    rows, comments = offsets(tmp_path / "geared.csv")
+    assert [row["motor_rad"] != "" for row in rows] == [False, True, True, False, False, False]
+    assert float(rows[1]["motor_rad"]) == pytest.approx(80.0 * np.radians(HIDDEN_DEG[1]), abs=0.02)
+    assert "motor_rad is empty for axes 4, 5, 6:" in "\n".join(comments)
 
 
 def test_what_wrong_lengths_leave_on_the_robot_is_in_the_table_and_in_the_sigmas(tmp_path):
