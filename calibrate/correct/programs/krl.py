@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from calibrate.correct.corrected import Branch
 from calibrate.correct.programs import literal
-from calibrate.correct.programs.stated_frames import Event, Used, routines_of, set_above, words_of
+from calibrate.correct.programs.stated_frames import Event, Used, alike, routines_of, set_above, words_of
 from calibrate.correct.rotations import KUKA
 
 Floats = NDArray[np.float64]
@@ -90,9 +90,9 @@ def find(text: str, n_joints: int) -> literal.Targets:
         else:
             name = match["name"]
             moves = literal.moves_to(by_name, name)
-        alone = any(WITH.match(move.text) and SET.search(move.text) for move in moves)
-        own = None if inline or alone else inline_data.get("F" + name.upper().removeprefix("X"))
-        one = _literal(text, match, name, moves, n_joints, own)
+        own = None if inline else inline_data.get("F" + name.upper().removeprefix("X"))
+        moves = tuple(_move(move, own) if own else move for move in moves)
+        one = _literal(text, match, name, moves, n_joints, None if moves else own)
         if one is None and not inline:
             why = f"{name}: an aggregate that does not state the whole target is not corrected"
             skipped.append(f"line {literal.line_of(text, match.start('fields'))}: {why}")
@@ -102,6 +102,20 @@ def find(text: str, n_joints: int) -> literal.Targets:
     skipped += literal.sentences(code, by_name, literals, CHANGED, others)
     absent = literal.absent(code, CALLED.finditer(code), ROUTINE, BUILT_IN, "sets $BASE or $TOOL")
     return literal.Targets(tuple(sorted(literals, key=lambda one: one.at)), tuple(skipped), absent)
+
+
+def _move(move: literal.Move, own: Used) -> literal.Move:
+    """With base and tool of the FDAT of its point where the program names none; where it names others, refused."""
+    if WITH.match(move.text) and SET.search(move.text):
+        return move
+
+    def settled(place: literal.NamedPose, stated: literal.NamedPose, word: str) -> literal.NamedPose:
+        if alike(place, stated) or not (place.name or place.refused):
+            return stated
+        why = f"the {word} at the move, {place.name}, is not that of the FDAT of its point, {stated.name}"
+        return place if place.refused else replace(place, refused=why)
+
+    return replace(move, frame=settled(move.frame, own[0], "base"), tool=settled(move.tool, own[1], "tool"))
 
 
 def _literal(

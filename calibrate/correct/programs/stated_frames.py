@@ -234,7 +234,7 @@ class _Flow:
             elif event.kind == "end" and opened:
                 kind, begin, entered, ways = opened.pop()
                 state = entered if kind == "scope" else self._joined([*ways, state])
-                if kind == "loop" and not _alike(state, entered):
+                if kind == "loop" and not alike(state, entered):
                     k = begin  # once more, as it is entered from its end
                     continue
             elif event.kind == "tested" and opened:
@@ -250,7 +250,7 @@ class _Flow:
                 ends.append(state)
             elif event.kind == "goto" and self.is_set:
                 ways = jumps.setdefault(event.name, [])
-                ways += [] if any(_alike(state, other) for other in ways) else [state]
+                ways += [] if any(alike(state, other) for other in ways) else [state]
                 state = NOWHERE
             elif event.kind == "label":
                 state = self._joined([state, *jumps.get(event.name, [])], f"{LABEL} {event.name}")
@@ -286,12 +286,12 @@ class _Flow:
 
     def _joined(self, ways: Sequence[NamedPose], why: str = BRANCH) -> NamedPose:
         ways = [one for one in ways if one is not NOWHERE] or [NOWHERE]
-        if all(_alike(ways[0], other) for other in ways):
+        if all(alike(ways[0], other) for other in ways):
             return ways[0]
         return next((one for one in ways if one.refused), self._refuse(why))
 
 
-def _alike(one: NamedPose, other: NamedPose) -> bool:
+def alike(one: NamedPose, other: NamedPose) -> bool:
     """The same numbers, or where one is not known the same name."""
     same = one.name == other.name if one.T is None or other.T is None else np.array_equal(one.T, other.T)
     return same and one.refused == other.refused

@@ -232,6 +232,16 @@ def test_the_form_of_a_move_with_the_frames_of_its_fdat() -> None:
     assert tool.name == "TOOL_DATA[3]"
 
 
+FDAT = f"BASE_DATA[1] = {POSE}\nDECL FDAT FP1 = {{TOOL_NO 0, BASE_NO 1}}\nDECL E6POS XP1 = {POSE}\nDEF a()\n"
+
+
+def test_a_base_that_the_program_sets_is_not_replaced_by_that_of_the_points_fdat() -> None:
+    says = "the base at the move, base as set in line 5, is not that of the FDAT of its point, BASE_DATA[1]"
+    assert of_krl(f"{FDAT}{base(0.9)}LIN XP1\nEND\n") == [says]
+    for text in (f"{base(0.001)}LIN XP1\n", f"{base(0.9)}FDAT_ACT = FP1\nLIN XP1\n", "LIN XP1\n", ""):
+        assert of_krl(f"{FDAT}{text}END\n") == [0.001]
+
+
 def test_the_base_of_a_spline_block_ends_with_the_block() -> None:
     header = base(2).replace("$BASE", "SPLINE WITH $BASE")
     text = f"DEF a()\n{base(1)}{header}SLIN {POSE}\nENDSPLINE\n{POINT}END\n"
