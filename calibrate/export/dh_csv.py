@@ -149,6 +149,7 @@ def _together(
     scaled = J / np.tile(PLAUSIBLE, len(names) // len(NAMES))[:, None]
     beside = np.array([[(p is other) / p.plausible for p in free] for other in others]).reshape(-1, len(free))
     rows = np.concatenate([scaled, beside]) @ seen.unseen
+    rows /= max(1.0, float(np.abs(rows).max(initial=0.0)))  # of wide tolerances, their rounding is as much larger
     weakest = STRUCTURAL * seen.singular_values.max(initial=0.0)
     never = _basis(rows[:, seen.singular_values[seen.rank :] < weakest])
     basis = np.concatenate([never, _basis(rows - never @ (never.T @ rows))], axis=1)

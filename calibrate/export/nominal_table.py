@@ -28,7 +28,7 @@ DEGREES, MILLIMETRES = (math.degrees(1.0), "deg"), (1e3, "mm")
 DH = (("offset", "d_m"), ("length", "a_m"), ("twist", "alpha_rad"), ("tilt", None))  # correction, drawn number
 POE = ("x", "y", "z", "roll", "pitch", "yaw")
 UNIT = {"deg": "°", "mm": "mm"}
-NO_DH = "for its D-H table: calibeam identify REC --export table"
+NO_DH = "for its D-H table identify the recording again"
 NOMINAL_DECIMALS = 2  # of a nominal value beside which there is no sigma
 HEADING = ("parameter", "unit", "nominal", "correction", "sigma", "calibrated", "not_determined_because")
 

@@ -12,7 +12,7 @@ from scipy.optimize import nnls
 from scipy.stats import chi2
 
 from acquisition.recording import Recording, Samples, readings_sha256
-from acquisition.recording.rig import rig_sha256
+from acquisition.recording.rig import ArmModel, rig_sha256
 from acquisition.recording.samples import measured_sha256
 from calibrate.diagnose.bench import Bench
 from calibrate.diagnose.blunders_first import Cleared
@@ -34,6 +34,7 @@ from calibrate.effects.second_encoders import SECOND
 from calibrate.effects.term import Shape, Size
 from calibrate.effects.time_laws import FOR_A_WHILE
 from calibrate.errors import DataError
+from calibrate.export.dh_csv import dh_table_of
 from calibrate.fit import Status, Stop
 from calibrate.fit_plan import LossName, SolverName
 from calibrate.identifiability import Identifiability, analyse
@@ -143,6 +144,8 @@ def model_of_fit(
         ),
     )
     model = _as_listed(model, fit, parameters, covariance, conditions)
+    if recording.rig.arm.model is ArmModel.LOCAL_POE:
+        model = structs.replace(model, dh_table=dh_table_of(recording.rig, model, parameters, seen))
     return as_fitted(model, fit.session.samples, list(_misfits(fit)))
 
 

@@ -187,7 +187,7 @@ class SessionEvidence:
         rig = rig_in_model(self.recording.rig, ArmModel(model.arm_model))
         values = {p.name: model.chain.get(p.name, 0.0) for p in arm_of(rig).parameters}
         poses = rig.arm.model is ArmModel.LOCAL_POE
-        if not poses or model.effects:
+        if not poses or (model.effects and not model.dh_table):
             listed = [p for p in model.parameters if not poses or p.name.startswith("joint")]
             return identified_arm(rig, values, stated=listed, covariance=model.covariance)
         if model.dh_table:

@@ -55,7 +55,7 @@ def test_lengths_and_twists_are_those_between_the_axes_of_the_real_arm(identifie
     assert sum(abs(row.correction) > 4.0 * row.sigma for row in away) > 5  # the nominal arm is another one
 
 
-def test_the_exported_table_has_the_rows_of_the_report_or_names_the_command(identified, tmp_path):
+def test_the_exported_table_has_the_rows_of_the_report_or_names_the_remedy(identified, tmp_path):
     at = identified[0]
     model, out = read_model(at / "model.json"), tmp_path / "arm.csv"
     assert run(["export-model", str(at / "model.json"), "--to", "table", "--out", str(out)]) == 0
@@ -68,7 +68,17 @@ def test_the_exported_table_has_the_rows_of_the_report_or_names_the_command(iden
     assert sum(row[-1] == "" for row in rows) >= 15
     write_model(tmp_path / "older.json", replace(model, dh_table=()))
     assert run(["export-model", str(tmp_path / "older.json"), "--to", "table", "--out", str(out), "--force"]) == 0
-    assert "calibeam identify REC --export table" in out.read_text(encoding="utf-8")
+    assert "for its D-H table identify the recording again" in out.read_text(encoding="utf-8")
+
+
+def test_a_diagnosed_model_has_the_same_table(identified, tmp_path):
+    session, model = identified[0] / "session", tmp_path / "model.json"
+    assert run(["diagnose", str(session), "--out", str(tmp_path / "diagnosis.json"), "--model-out", str(model)]) == 0
+    rows, same = rows_of(session_evidence(read(session), read_model(model))), rows_of(identified[1])
+    assert {name: row.why for name, row in rows.items()} == {name: row.why for name, row in same.items()}
+    for name, row in rows.items():
+        if row.calibrated is not None:
+            assert abs(row.calibrated - same[name].calibrated) < 2.0 * row.sigma < 4.0 * same[name].sigma
 
 
 def test_what_no_tracker_of_unknown_place_shows_has_a_reason_and_no_number(identified):
