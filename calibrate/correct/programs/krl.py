@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from calibrate.correct.corrected import Branch
 from calibrate.correct.programs import literal
-from calibrate.correct.programs.stated_frames import Event, Used, alike, routines_of, set_above, words_of
+from calibrate.correct.programs.stated_frames import Event, Used, alike, handed_over, routines_of, set_above, words_of
 from calibrate.correct.rotations import KUKA
 
 Floats = NDArray[np.float64]
@@ -62,6 +62,9 @@ CHANGED = re.compile(r"(?<![\w$.])(?P<name>\$?\w+(?:[ \t]*\[[^\]\n]*\])?)(?:\.\w
 CHOSEN = re.compile(r"\[(?!\d+\])")  # an index that is no number
 INLINE_FORM = re.compile(r"S(?:BASE|TOOL2?)\s*\(\s*(?P<name>\w+)\s*\)\s*", re.IGNORECASE)
 FIXED = re.compile(r"\$IPO_MODE\s*=\s*#TCP|IPO_FRAME\s+#TCP", re.IGNORECASE)
+DATA_LIST = re.compile(r"^[ \t]*DEFDAT\b.*?^[ \t]*ENDDAT\b", LINES | re.DOTALL)
+NUMBERED = re.compile(r"(?:BASE|TOOL)_DATA\[")
+BY_REFERENCE = re.compile(r"[(,]\s*\w+(?:\[[^\]]*\])?\s*(?:,|$|:\s*OUT)", re.IGNORECASE)
 CALLED = re.compile(r"(?:^|\bDO)[ \t]*(?P<name>[A-Z]\w*)[ \t]*\(", LINES)
 # Statements, and subprograms of the system that leave bases and tools as they are, or are followed (BAS).
 BUILT_IN = literal.built_in(r"""
@@ -90,9 +93,9 @@ def find(text: str, n_joints: int) -> literal.Targets:
         else:
             name = match["name"]
             moves = literal.moves_to(by_name, name)
-        own = None if inline else inline_data.get("F" + name.upper().removeprefix("X"))
-        moves = tuple(_move(move, own) if own else move for move in moves)
-        one = _literal(text, match, name, moves, n_joints, None if moves else own)
+        fdat = "" if inline else "F" + name.upper().removeprefix("X")
+        moves = tuple(_move(move, inline_data(fdat, move.line_start)) for move in moves)
+        one = _literal(text, match, name, moves, n_joints, None if moves else inline_data(fdat, len(code)))
         if one is None and not inline:
             why = f"{name}: an aggregate that does not state the whole target is not corrected"
             skipped.append(f"line {literal.line_of(text, match.start('fields'))}: {why}")
@@ -104,9 +107,9 @@ def find(text: str, n_joints: int) -> literal.Targets:
     return literal.Targets(tuple(sorted(literals, key=lambda one: one.at)), tuple(skipped), absent)
 
 
-def _move(move: literal.Move, own: Used) -> literal.Move:
+def _move(move: literal.Move, own: Used | None) -> literal.Move:
     """With base and tool of the FDAT of its point where the program names none; where it names others, refused."""
-    if WITH.match(move.text) and SET.search(move.text):
+    if own is None or (WITH.match(move.text) and SET.search(move.text)):
         return move
 
     def settled(place: literal.NamedPose, stated: literal.NamedPose, word: str) -> literal.NamedPose:
@@ -160,32 +163,36 @@ def _turn(span: literal.Span, number: float) -> tuple[Branch, literal.Turns]:
     return asked, turns
 
 
-def _places(code: str) -> tuple[literal.Places, dict[str, Used]]:
+def _places(code: str) -> tuple[literal.Places, Callable[[str, int], Used | None]]:
     """Base and tool of an instruction, as the program has set them on its way there; of inline forms by FDAT name."""
-    place = _poses(code)
-    nothing = place("", "")
-    inline = dict[str, Used]()
+    ways = routines_of(code, ROUTINE, WAY)
+    ways += [Event(m.start(), m.lastgroup or "", (m["goto"] or m["label"]).lower()) for m in JUMP.finditer(code)]
+    fixed = "the tool is stationary (#TCP), which is not corrected" if FIXED.search(code) else ""
+    nothing = literal.NamedPose(refused=fixed)
+    place = _poses(code, ways, nothing)
+    data = dict[str, tuple[str, str]]()  # of inline forms
     for match in INLINE_DATA.finditer(code):
         numbers = {key: f"{number:.0f}" for key, (_, number) in _fields(code, *match.span("fields")).items()}
-        base, tool = (place(what, f"{what}_DATA[{numbers.get(what + '_NO')}]") for what in ("BASE", "TOOL"))
-        inline[match["name"].upper()] = (base, tool)
+        data[match["name"].upper()] = (f"BASE_DATA[{numbers.get('BASE_NO')}]", f"TOOL_DATA[{numbers.get('TOOL_NO')}]")
+
+    def inline(fdat: str, at: int) -> Used | None:
+        names = data.get(fdat)
+        return (place("BASE", names[0], at), place("TOOL", names[1], at)) if names else None
 
     def poses(match: re.Match[str]) -> tuple[literal.NamedPose | None, literal.NamedPose | None]:
         value = match["value"] or ""
         form = INLINE_FORM.fullmatch(value)
         fdat = match["inline"] or (form and form["name"])
         unknown = replace(nothing, name=f"FDAT {fdat}")
-        base, tool = inline.get(fdat.upper(), (unknown, unknown)) if fdat else (None, None)
+        base, tool = (inline(fdat.upper(), match.start()) or (unknown, unknown)) if fdat else (None, None)
         what = (match["what"] or match["kind"] or "").upper()
-        pose = place(what, value or f"{what}_DATA[{match['number']}]")
+        pose = place(what, value or f"{what}_DATA[{match['number']}]", match.start())
         if pose.name == f"${what}":  # written out
             line = literal.line_of(code, match.start())
             pose = replace(pose, name=f"base as set in line {line}" if what == "BASE" else f"$TOOL of line {line}")
         return (None if what == "TOOL" else base or pose), (None if what == "BASE" else tool or pose)
 
     alone = {match.start(): match.end() for match in WITH.finditer(code)}
-    ways = routines_of(code, ROUTINE, WAY)
-    ways += [Event(m.start(), m.lastgroup or "", (m["goto"] or m["label"]).lower()) for m in JUMP.finditer(code)]
     sets: tuple[list[Event], list[Event]] = ([], [])
     for match in SET.finditer(code):
         if literal.line_start(code, match.start()) not in alone:
@@ -203,24 +210,41 @@ def _places(code: str) -> tuple[literal.Places, dict[str, Used]]:
     return places, inline
 
 
-def _poses(code: str) -> Callable[[str, str], literal.NamedPose]:
-    """Of what a base or tool is set to: a frame of the file with one value, or a literal; each is read once."""
-    held = {_key(match["name"]): _frame(code, *match.span("fields")) for match in HELD.finditer(code)}
-    times = Counter(_key(match["name"]) for match in CHANGED.finditer(code))
-    fixed = "the tool is stationary (#TCP), which is not corrected" if FIXED.search(code) else ""
+def _poses(code: str, ways: list[Event], nothing: literal.NamedPose) -> Callable[[str, str, int], literal.NamedPose]:
+    """Of what a base or tool is set to at a place: a literal, or a frame as the program assigns it on its way there."""
+    held = {match.start("name"): _frame(code, *match.span("fields")) for match in HELD.finditer(code)}
+    assigned = [(match.start("name"), match.end(), _key(match["name"])) for match in CHANGED.finditer(code)]
+    times, changes = Counter(name for _, _, name in assigned), list[tuple[int, str, literal.NamedPose]]()
+    for begin, end, name in assigned:  # other variables may be local ones of several routines
+        T = held.get(begin) if times[name] == 1 or NUMBERED.match(name) else None
+        changes.append((end, name, replace(nothing, name=name, T=T)))
+    for at, name in handed_over(code, ROUTINE, BY_REFERENCE, "\n"):
+        why = f"{name} may be changed by the routine that line {literal.line_of(code, at)} calls"
+        changes.append((at, _key(name), replace(nothing, refused=why)))
+    begins = [match.start() for match in ROUTINE.finditer(code)][:1]
+    lists = [(0, begin) for begin in begins] + [match.span() for match in DATA_LIST.finditer(code)]
 
     @cache
-    def place(what: str, value: str) -> literal.NamedPose:
-        name = _key(value)
-        if name in ("$NULLFRAME", "$WORLD", f"{what}_DATA[0]"):
-            return literal.NamedPose(name, np.eye(4), fixed)
-        written = re.fullmatch(AGGREGATE, value.rstrip(), re.IGNORECASE)
-        if written and (T := _frame(value, *written.span("fields"))) is not None:
-            return literal.NamedPose(f"${what}", T, fixed)
-        chosen = f"the pose of {name} is chosen while the program runs" if CHOSEN.search(name) else ""
-        return literal.NamedPose(name, held.get(name) if times[name] == 1 else None, fixed or chosen)
+    def above(name: str) -> Callable[[int], literal.NamedPose]:
+        array = name.split("[")[0]
+        chosen = replace(nothing, refused=f"an element of {array} is chosen while the program runs")
+        own = [(at, pose) for at, changed, pose in changes if changed in (name, array)]
+        first = [pose for at, pose in own if any(begin <= at < end for begin, end in lists)]  # there from the beginning
+        own += [(at, chosen) for at, one, _ in changes if CHOSEN.search(one) and one.split("[")[0] == array]
+        sets = [Event(at, "set", "", pose) for at, pose in own]
+        return set_above([*ways, *sets], (first or [replace(nothing, name=name)])[-1], f"pose of {name}")
 
-    return place
+    @cache
+    def constant(what: str, name: str, value: str) -> literal.NamedPose | None:
+        if name in ("$NULLFRAME", "$WORLD", f"{what}_DATA[0]"):
+            return replace(nothing, name=name, T=np.eye(4))
+        if CHOSEN.search(name):
+            return replace(nothing, name=name, refused=f"the pose of {name} is chosen while the program runs")
+        written = re.fullmatch(AGGREGATE, value.rstrip(), re.IGNORECASE)
+        T = _frame(value, *written.span("fields")) if written else None
+        return None if T is None else replace(nothing, name=f"${what}", T=T)
+
+    return lambda what, value, at: constant(what, _key(value), value) or above(_key(value))(at)
 
 
 def _frame(text: str, begin: int, end: int) -> Floats | None:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from calibrate.correct.corrected import Branch
 from calibrate.correct.programs import literal
+from calibrate.correct.programs.stated_frames import handed_over
 from calibrate.correct.rotations import QUATERNION
 
 Floats = NDArray[np.float64]
@@ -51,7 +52,8 @@ ARC = rf"{ROUND}(?:{NAME}(?:\((?:[^();]|\([^();]*\))*\))?|{ROBTARGET.replace('?P
 ARC_END = re.compile(rf"{ARC}(?P<target>\[|{NAME})", re.IGNORECASE)
 INLINE = re.compile(rf"(?:{INSTRUCTION}|{ARC})$", re.IGNORECASE)
 REST = re.compile(r"\bMove\w+\s+(?:\[.*\]\]|\w+)\s*(?P<rest>(?:\\[^,]*)?,.*;)", re.IGNORECASE)
-ROUTINE = re.compile(r"\b(?:PROC|RECORD)\s+(?P<name>\w+)", re.IGNORECASE)
+ROUTINE = re.compile(r"\b(?:PROC|RECORD|FUNC\s+\w+)\s+(?P<name>\w+)(?:\s*\([^)]*)?", re.IGNORECASE)
+BY_REFERENCE = re.compile(r"\b(?:INOUT|VAR|PERS)\b", re.IGNORECASE)
 # Behind the condition of an IF without THEN comes what is no operand any more.
 IF = r"\bIF\b[^;\n]{0,99}?(?<=[\w)}])(?<!\bAND|\bXOR|\bNOT|\bDIV|\bMOD)(?<!\bOR|\bIF)\s+(?!(?:AND|X?OR|DIV|MOD|THEN)\b)"
 CALLED = re.compile(
@@ -151,19 +153,20 @@ def _quarters(confdata: Sequence[tuple[literal.Span, float]]) -> tuple[Branch, l
 def _places(code: str) -> literal.Places:
     """Work object and tool of an instruction; what the program assigns to is known to none before it runs."""
     times = Counter(match["name"].lower() for match in ASSIGNED.finditer(code))
+    given = {name for _, name in handed_over(code, ROUTINE, BY_REFERENCE, ";")}
     held = {"wobj0": literal.NamedPose("wobj0", np.eye(4)), "tool0": literal.NamedPose("tool0", np.eye(4))}
     for match in (*OBJECT.finditer(code), *TOOL.finditer(code)):
         name, is_object = match["name"], match.re is OBJECT
         pose = np.eye(4)
         for group in ("user", "object") if is_object else ("frame",):
             pose = pose @ RAPID.frame([v for _, v in literal.numbers_in(code, *match.span(group))])
-        assigned = times[name.lower()] > 1
-        why = ""
+        why = f"{name} is given to a routine that may change it" if name.lower() in given else ""
+        known = times[name.lower()] == 1 and not why
         if is_object and (match["held"].upper(), match["fixed"].upper()) != ("FALSE", "TRUE"):
             why = f"work object {name} is held by a robot or moved by a unit, which is not corrected"
         elif not is_object and match["held"].upper() != "TRUE":
             why = f"tool {name} is stationary, which is not corrected"
-        held[name.lower()] = literal.NamedPose(name, None if assigned else pose, why)
+        held[name.lower()] = literal.NamedPose(name, pose if known else None, why)
     for match in PARAMETER.finditer(code):
         held[match["name"].lower()] = literal.NamedPose(refused=f"{match['name']} is a parameter of its routine")
 

@@ -6,7 +6,7 @@ at all is that of the rig file. What a program sets holds until it sets another,
 """
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,6 +19,7 @@ Floats = NDArray[np.float64]
 
 SAME = 2e-6  # m and of a rotation matrix: rounding of what is written
 CALL = re.compile(r"(?:\b(?P<started>DO|run)[ \t]+)?(?<![\w$.#])(?P<name>[A-Z_]\w*)[ \t]*\(", re.IGNORECASE)
+WORD = re.compile(r"[A-Za-z_]\w*")
 BLOCKS = ("if", "loop", "scope")
 CALLS = ("call", "started")
 BRANCH = "is set in a branch or a loop above, or not"
@@ -179,8 +180,21 @@ def closed(code: str, at: int) -> int:
     return at
 
 
+def handed_over(
+    code: str, begins: re.Pattern[str], by_reference: re.Pattern[str], end: str
+) -> Iterator[tuple[int, str]]:
+    """Calls of routines of the file that may change what they are given: where, and each name up to their end."""
+    heads = {m["name"].lower(): m.start("name") for m in begins.finditer(code) if by_reference.search(m[0])}
+    for match in WORD.finditer(code) if heads else ():
+        if (name := match[0].lower()) in heads and match.start() != heads[name]:
+            yield from (
+                (match.start(), word)
+                for word in words_of(code[match.end() : match.end() + LONGEST_MOVE].partition(end)[0])
+            )
+
+
 def words_of(text: str) -> frozenset[str]:
-    return frozenset(re.findall(r"[a-z_]\w*", text.lower()))
+    return frozenset(match[0].lower() for match in WORD.finditer(text))
 
 
 class _Flow:
@@ -293,5 +307,6 @@ class _Flow:
 
 def alike(one: NamedPose, other: NamedPose) -> bool:
     """The same numbers, or where one is not known the same name."""
-    same = one.name == other.name if one.T is None or other.T is None else np.array_equal(one.T, other.T)
-    return same and one.refused == other.refused
+    if one.T is None or other.T is None:
+        return one.T is other.T and (one.name, one.refused) == (other.name, other.refused)
+    return np.array_equal(one.T, other.T) and one.refused == other.refused

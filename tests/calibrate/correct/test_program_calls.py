@@ -96,6 +96,39 @@ def test_a_target_behind_a_label_is_left_with_its_reason() -> None:
     assert says == "the base is not the same on all ways to the label on"
 
 
+def data(metres: float) -> str:
+    return base(metres).replace("$BASE", "BASE_DATA[1]")
+
+
+OTHERS = f"DEFFCT INT check()\n{base(2)}ENDFCT\nDEFFCT INT other(n:IN)\n{base(3)}ENDFCT\nDEF early()\nIF a THEN\n"
+OTHERS += f"RETURN check()\nENDIF\nEND\nDEF init()\n{data(3)}t.X = 5\nEND\nDEF shift(f:OUT)\nEND\nDEF show(f:IN)\nEND\n"
+USE = f"BAS(#BASE, 1)\n{POINT}"
+FDAT = f"DECL FDAT FP1 = {{TOOL_NO 0, BASE_NO 1}}\nDECL E6POS XP1 = {POINT[4:]}{data(4)}"
+WAYS = {  # behind base 1; bases of its moves, None: left
+    "condition and else": (f"IF check() THEN\n{POINT}ELSE\n{POINT}ENDIF\n{POINT}", [2.0, 2.0, 2.0]),
+    "condition and case": (f"SWITCH check()\nCASE 1\n{POINT}CASE 2\n{POINT}ENDSWITCH\n", [2.0, 2.0]),
+    "while": (f"WHILE check()\n{base(1)}ENDWHILE\n{POINT}", [None]),
+    "until": (f"REPEAT\n{POINT}UNTIL check() > 1\n", [None]),
+    "return": (f"early()\n{POINT}", [None]),
+    "call in a call": (f"k = other(check())\n{POINT}", [3.0]),
+    "frame of a point": (f"{FDAT}LIN XP1\n", [None]),
+    "the same frame": (f"{FDAT}{base(4)}LIN XP1\n", [4.0]),
+    "data in a branch": (f"IF a THEN\n{data(3)}ENDIF\n{USE}", [None]),
+    "data behind": (f"{USE}{data(3)}{USE}", [None, 3.0]),
+    "index": (f"{data(3)}BASE_DATA[i].X = 5\n{USE}", [None]),
+    "by reference": (f"{data(3)}shift(BASE_DATA[1])\n{USE}", [None]),
+    "by value": (f"{data(3)}show(BASE_DATA[1])\n{USE}", [3.0]),
+    "a name of two routines": (f"t = {POINT[4:]}init()\n$BASE = t\n{POINT}", [None]),
+    "data of a called routine": (f"init()\n{USE}", [3.0]),
+}
+
+
+@pytest.mark.parametrize(("body", "bases"), WAYS.values(), ids=WAYS)
+def test_moves_have_the_base_and_the_frame_data_of_the_way_to_them(body: str, bases: list[float | None]) -> None:
+    found = of_krl(f"DEF main()\n{base(1)}{body}END\n{OTHERS}")
+    assert [None if isinstance(one, str) else one for one in found] == bases
+
+
 def test_a_routine_that_an_interrupt_starts_has_no_known_base() -> None:
     text = f"DEF main()\n{base(1)}INTERRUPT DECL 3 WHEN $IN[1] DO stop()\n{POINT}END\nDEF stop()\n{POINT}END\n"
     assert of_krl(text) == [1.0, "the base is that of any moment at which stop may be started"]
@@ -178,25 +211,6 @@ def test_a_thread_may_set_the_tool_at_any_moment() -> None:
     assert of_urscript(text) == ["the tool is set in the called routine hand"]
 
 
-CONDITIONS = {  # body after base 1, with check() setting base 2; bases of its moves
-    "else": (f"IF check() THEN\n{POINT}ELSE\n{POINT}ENDIF\n{POINT}", [2.0, 2.0, 2.0]),
-    "case": (f"SWITCH check()\nCASE 1\n{POINT}CASE 2\n{POINT}ENDSWITCH\n{POINT}", [2.0, 2.0, 2.0]),
-    "while": (f"WHILE check()\n{base(1)}{POINT}ENDWHILE\n{base(1)}{POINT}", [1.0, 1.0]),
-    "behind while": (f"WHILE check()\n{base(1)}ENDWHILE\n{POINT}", [None]),
-    "for": (f"FOR i = 1 TO check()\n{POINT}{base(1)}ENDFOR\n{POINT}", [None, None]),
-    "until": (f"REPEAT\n{POINT}UNTIL check() > 1\n{POINT}", [None, None]),
-    "return": (f"other()\n{POINT}END\nDEF other()\nIF a THEN\nRETURN check()\nENDIF\n", [None]),
-    "one call in another": (f"k = other(check())\n{POINT}END\nDEFFCT INT other(n:IN)\n{base(3)}", [3.0]),
-    "what is set": ("$BASE = check()\n" + POINT, ["CHECK()"]),
-}
-
-
-@pytest.mark.parametrize(("body", "bases"), CONDITIONS.values(), ids=CONDITIONS)
-def test_calls_in_a_condition_come_before_its_branches(body: str, bases: list[float | str | None]) -> None:
-    found = of_krl(f"DEF main()\n{base(1)}{body}END\nDEFFCT INT check()\n{base(2)}ENDFCT\n")
-    assert [one if one in bases else None for one in found] == bases
-
-
 def test_calls_in_conditions_of_urscript_come_before_their_branches() -> None:
     grip = f"def weld():\ndef grip():\n{tcp(2)}end\n{tcp(1)}"
     assert of_urscript(f"{grip}if grip(): {tcp(3)}else: {MOVEL}end\nend\n") == [2.0]
@@ -232,14 +246,15 @@ def test_the_form_of_a_move_with_the_frames_of_its_fdat() -> None:
     assert tool.name == "TOOL_DATA[3]"
 
 
-FDAT = f"BASE_DATA[1] = {POSE}\nDECL FDAT FP1 = {{TOOL_NO 0, BASE_NO 1}}\nDECL E6POS XP1 = {POSE}\nDEF a()\n"
-
-
-def test_a_base_that_the_program_sets_is_not_replaced_by_that_of_the_points_fdat() -> None:
-    says = "the base at the move, base as set in line 5, is not that of the FDAT of its point, BASE_DATA[1]"
-    assert of_krl(f"{FDAT}{base(0.9)}LIN XP1\nEND\n") == [says]
-    for text in (f"{base(0.001)}LIN XP1\n", f"{base(0.9)}FDAT_ACT = FP1\nLIN XP1\n", "LIN XP1\n", ""):
-        assert of_krl(f"{FDAT}{text}END\n") == [0.001]
+def test_a_work_object_that_a_called_routine_may_change_is_left() -> None:
+    pose, move = (
+        "[[0,0,0],[1,0,0,0]]",
+        "MoveL [[1,2,3],[1,0,0,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]], v50, fine, tool0",
+    )
+    text = f'PERS wobjdata w1 := [FALSE,TRUE,"",{pose},{pose}];\nPROC main()\nsetup w1;\n{move}\\WObj:=w1;\nENDPROC\n'
+    for head, says in (("INOUT ", "w1 is given to a routine that may change it"), ("", "")):
+        found = rapid.find(f"{text}PROC setup({head}wobjdata w)\nENDPROC\n", 6)
+        assert found.literals[0].used[0][0].refused == says
 
 
 def test_the_base_of_a_spline_block_ends_with_the_block() -> None:
