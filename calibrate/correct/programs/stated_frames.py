@@ -80,16 +80,15 @@ def stated(
 def _check_given(kind: _Kind, given: Floats | None, places: Sequence[NamedPose], name: str) -> None:
     if given is None or not places:
         return
-    left_open = {place.name for place in places if place.T is None}
+    left_open = {place.name for place in places if place.T is None and not place.refused}
     if len(left_open) > 1:
         raise DataError(
             f"{name}: targets are in the {kind.name}s {_listed(left_open)}, which the file does not hold, and "
             f"{kind.option} states one; declare them in the file, or correct a file for each"
         )
-    if kind is FRAME and not left_open:
-        raise DataError(
-            f"{name}: the frames of all targets are known ({_listed({p.name for p in places})}); leave --frame out"
-        )
+    known = _listed({place.name for place in places if not place.refused})
+    if kind is FRAME and known and not left_open:
+        raise DataError(f"{name}: the frames of all targets are known ({known}); leave --frame out")
 
 
 def _unusable(kind: _Kind, used: Sequence[NamedPose], given: Floats | None) -> str:

@@ -149,6 +149,12 @@ def test_a_quaternion_that_is_none_is_refused():
     assert "quaternion [0.0, 0.0, 0.0, 0.0]: its length is not 1" in skipped(text, ".mod")
 
 
+def test_a_stated_frame_is_none_for_targets_that_are_refused():
+    T, branch = krl_pose(target(TABLE, np.eye(4))), "  IF a THEN\n$BASE = $NULLFRAME\nENDIF\n"
+    done = corrected(f"BAS(#BASE, 1)\nLIN {{{T}}}\n{branch}LIN {{{T}}}\n", ".src", TABLE)
+    assert (len(done.names), len(done.skipped)) == (1, 1)
+
+
 KRL_FRAMES = {
     "literal": "  $BASE = {{{base}}}\n  $TOOL = {{{tool}}}\n",
     "data": "  BASE_DATA[2] = {{{base}}}\n  TOOL_DATA[3] = {{FRAME: {tool}}}\n"
