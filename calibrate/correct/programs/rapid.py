@@ -39,6 +39,8 @@ ASSIGNED = re.compile(r"\b(?P<name>\w++(?:\{[^{};]*\})?)(?:\.\w++)*+\s*+:=")
 PARAMETER = re.compile(r"\b(?:wobjdata|tooldata)\s+(?P<name>\w+)\s*[,)|]", re.IGNORECASE)
 USED = re.compile(r"\\WObj\s*:=\s*(?P<name>\w+)", re.IGNORECASE)
 SHIFTED = re.compile(r"\bPDisp(?:Set|On)\b", re.IGNORECASE)
+# Moves whose tool comes before what else they do; C has a target more, \Conc stands before the target.
+PLAIN = re.compile(r"Move(C)?\w*\s+(\\\w+\s*$)?", re.IGNORECASE)
 NAMED = re.compile(
     r"\b(?:robtarget|jointtarget)\s+(?P<name>\w+)\s*(?P<count>\{\s*\d+\s*\})?\s*:=\s*(?P<list>\[)?", re.IGNORECASE
 )
@@ -173,7 +175,9 @@ def _places(code: str) -> literal.Places:
     def places(at: int) -> tuple[literal.NamedPose, literal.NamedPose]:
         end = code.find(";", at, at + literal.LONGEST_MOVE)
         parts = _arguments(code[at : at + literal.LONGEST_MOVE if end < 0 else end])
-        last = next((part for part in parts if USED.search(part)), parts[3] if len(parts) > 3 else "")
+        plain = PLAIN.match(parts[0])
+        k = 3 + sum(group is not None for group in plain.groups()) if plain else len(parts) - 1
+        last = next((part for part in parts if USED.search(part)), parts[k] if k < len(parts) else "")
         used, tool = USED.search(last), last.split("\\")[0].strip()
         name = used["name"] if used else "wobj0"
         return held.get(name.lower(), literal.NamedPose(name)), held.get(tool.lower(), literal.NamedPose(tool))

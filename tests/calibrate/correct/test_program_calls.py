@@ -162,6 +162,15 @@ def test_a_work_object_that_is_a_parameter_is_not_that_of_the_module() -> None:
     assert not tool.refused
 
 
+@pytest.mark.parametrize(
+    "move", [r"MoveL \Conc,{},v9,z1", "MoveC p1,{},v9,z1", "ArcC p1,{},v9,a,b,z1", "TriggL {},v9,a,z1"]
+)
+def test_the_tool_of_a_move_in_no_work_object(move: str) -> None:
+    text = move.format("[[1,2,3],[1,0,0,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]]")
+    for last in ("tool1;", r"tool1\Corr;"):
+        assert rapid.find(f"{text},{last}", 6).literals[0].used[1][0].name == "tool1"
+
+
 def tcp(metres: float) -> str:
     return f"set_tcp(p[{metres}, 0, 0, 0, 0, 0])\n"
 
