@@ -43,8 +43,8 @@ ARC_END = re.compile(rf"{ARC}{TARGET}", LINES)
 OTHER = re.compile(rf"{GOES}_REL\b", LINES)
 ROUTINE = re.compile(r"^[ \t]*(?:GLOBAL\s+)?DEF(?:FCT\s+\w+)?\s+(?P<name>\w+)\s*\((?P<parameters>[^)]*)", LINES)
 WAY = re.compile(
-    r"^[ \t]*(?:(?P<while>WHILE\b[^\n]*)|(?P<loop>FOR\b[^\n]*|REPEAT|LOOP)|(?P<if>IF\b.*?(?:\bTHEN|$)|SWITCH\b[^\n]*)"
-    r"|(?P<scope>(?:PTP_)?SPLINE)|(?P<else>CASE)|(?P<otherwise>ELSE|DEFAULT)"
+    r"^[ \t]*(?:(?P<while>WHILE\b[^\n]*)|(?P<loop>FOR\b[^\n]*|REPEAT|LOOP)|(?P<if>IF\b.*?(?:\bTHEN|$))"
+    r"|(?P<switch>SWITCH\b[^\n]*)|(?P<scope>(?:PTP_)?SPLINE)|(?P<else>CASE)|(?P<otherwise>ELSE|DEFAULT)"
     r"|(?P<end>END(?:FOR|WHILE|LOOP|IF|SWITCH|SPLINE|FCT)?|UNTIL\b[^\n]*)|(?P<return>RETURN\b[^\n]*)|(?P<break>EXIT))"
     r"(?!\w)",
     LINES,

@@ -20,7 +20,7 @@ Floats = NDArray[np.float64]
 SAME = 2e-6  # m and of a rotation matrix: rounding of what is written
 CALL = re.compile(r"(?:\b(?P<started>DO|run)[ \t]+)?(?<![\w$.#])(?P<name>[A-Z_]\w*)[ \t]*\(", re.IGNORECASE)
 WORD = re.compile(r"[A-Za-z_]\w*")
-BLOCKS = ("if", "loop", "scope")
+BLOCKS = ("if", "switch", "loop", "scope")
 CALLS = ("call", "started")
 BRANCH = "is set in a branch or a loop above, or not"
 CALLERS = "is not the same at all calls of its routine"
@@ -125,9 +125,9 @@ def _listed(names: set[str]) -> str:
 class Event:
     """A place where a program sets a frame (or a tool, which is followed by itself), or branches.
 
-    `kind`: routine, call, started (as a thread or an interrupt), set, if, loop, scope, else (the next branch), tested
-    (behind the condition of a loop or branch), otherwise (the last branch), break, return, goto, label, end (of the
-    innermost block or routine; of a routine it becomes "left").
+    `kind`: routine, call, started (as a thread or an interrupt), set, if, switch, loop, scope, else (the next branch),
+    tested (behind the condition of a loop or branch), otherwise (the last branch), break, return, goto, label, end
+    (of the innermost block or routine; of a routine it becomes "left").
     """
 
     at: int
@@ -244,6 +244,7 @@ class _Flow:
                 if event.kind == "loop" and len(opened) > LOOPS:
                     state = self._joined([state, self._unknown(BRANCH, state)])
                 opened.append((event.kind, k, state, [state]))
+                state = NOWHERE if event.kind == "switch" else state  # up to its first case
             elif event.kind == "end" and opened:
                 kind, begin, entered, ways = opened.pop()
                 state = entered if kind == "scope" else self._joined([*ways, state])

@@ -107,6 +107,8 @@ FDAT = f"DECL FDAT FP1 = {{TOOL_NO 0, BASE_NO 1}}\nDECL E6POS XP1 = {POINT[4:]}{
 WAYS = {  # behind base 1; bases of its moves, None: left
     "condition and else": (f"IF check() THEN\n{POINT}ELSE\n{POINT}ENDIF\n{POINT}", [2.0, 2.0, 2.0]),
     "condition and case": (f"SWITCH check()\nCASE 1\n{POINT}CASE 2\n{POINT}ENDSWITCH\n", [2.0, 2.0]),
+    "default": (f"SWITCH k\nCASE 1\n{base(2)}DEFAULT\n{base(2)}ENDSWITCH\n{POINT}", [2.0]),
+    "no default": (f"SWITCH k\nCASE 1\n{base(2)}CASE 2\n{base(2)}ENDSWITCH\n{POINT}", [None]),
     "while": (f"WHILE check()\n{base(1)}ENDWHILE\n{POINT}", [None]),
     "until": (f"REPEAT\n{POINT}UNTIL check() > 1\n", [None]),
     "return": (f"early()\n{POINT}", [None]),
