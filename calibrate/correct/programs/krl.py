@@ -51,7 +51,7 @@ WAY = re.compile(
 )
 JUMP = re.compile(r"\bGOTO[ \t]+(?P<goto>\w+)|^[ \t]*(?P<label>[A-Z]\w*)[ \t]*:", LINES)
 SET = re.compile(
-    r"\$(?P<what>BASE|TOOL)(?:\.\w+)?[ \t]*=(?!=)[ \t]*(?P<value>(?:\{[^{}\n]*\}|\([^()\n]*\)|[^\n,])*)"
+    r"\$(?P<what>BASE|TOOL)(?P<part>\.\w+)?[ \t]*=(?!=)[ \t]*(?P<value>(?:\{[^{}\n]*\}|\([^()\n]*\)|[^\n,])*)"
     r"|\bBAS\s*\(\s*#(?P<kind>BASE|TOOL)\s*,\s*(?P<number>\w+)\s*\)|\bFDAT_ACT\s*=\s*(?P<inline>\w+)",
     re.IGNORECASE,
 )
@@ -187,8 +187,10 @@ def _places(code: str) -> tuple[literal.Places, Callable[[str, int], Used | None
         base, tool = (inline(fdat.upper(), match.start()) or (unknown, unknown)) if fdat else (None, None)
         what = (match["what"] or match["kind"] or "").upper()
         pose = place(what, value or f"{what}_DATA[{match['number']}]", match.start())
-        if pose.name == f"${what}":  # written out
-            line = literal.line_of(code, match.start())
+        line = literal.line_of(code, match.start())
+        if match["part"]:
+            pose = replace(nothing, refused=f"line {line} sets only a component of ${what}, which is not followed")
+        elif pose.name == f"${what}":  # written out
             pose = replace(pose, name=f"base as set in line {line}" if what == "BASE" else f"$TOOL of line {line}")
         return (None if what == "TOOL" else base or pose), (None if what == "BASE" else tool or pose)
 

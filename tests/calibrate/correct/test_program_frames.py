@@ -189,7 +189,7 @@ def test_points_of_inline_forms_have_the_frames_of_their_fdat():
         ("  BAS(#BASE, 2)\n", "the pose of BASE_DATA[2] is not in this file"),
         ("  FDAT_ACT=FP1\n", "the pose of FDAT FP1 is not in this file"),
         ("  $BASE = $NULLFRAME\n  $TOOL = TOOL_DATA[3]\n", "the pose of TOOL_DATA[3] is not in this file"),
-        ("  $BASE = $NULLFRAME\n  $BASE.X = 100.0\n", "is not in this file"),
+        ("  $BASE = $NULLFRAME\n  $BASE.X = 100.0\n", "line 3 sets only a component of $BASE, which is not followed"),
         ("  $BASE = $NULLFRAME\n  $IPO_MODE = #TCP\n", "the tool is stationary"),
         ("  $BASE = $NULLFRAME\nEND\nDEF below()\n", "the file sets no frame before it"),
     ],
