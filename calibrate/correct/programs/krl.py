@@ -223,8 +223,7 @@ def _poses(code: str, ways: list[Event], nothing: literal.NamedPose) -> Callable
     for at, name in handed_over(code, ROUTINE, BY_REFERENCE, "\n"):
         why = f"{name} may be changed by the routine that line {literal.line_of(code, at)} calls"
         changes.append((at, _key(name), replace(nothing, refused=why)))
-    begins = [match.start() for match in ROUTINE.finditer(code)][:1]
-    lists = [(0, begin) for begin in begins] + [match.span() for match in DATA_LIST.finditer(code)]
+    lists = [(0, m.start()) for m in (ROUTINE.search(code),) if m] + [m.span() for m in DATA_LIST.finditer(code)]
 
     @cache
     def above(name: str) -> Callable[[int], literal.NamedPose]:

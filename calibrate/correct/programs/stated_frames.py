@@ -179,17 +179,13 @@ def closed(code: str, at: int) -> int:
     return at
 
 
-def handed_over(
-    code: str, begins: re.Pattern[str], by_reference: re.Pattern[str], end: str
-) -> Iterator[tuple[int, str]]:
+def handed_over(code: str, begins: re.Pattern[str], changing: re.Pattern[str], end: str) -> Iterator[tuple[int, str]]:
     """Calls of routines of the file that may change what they are given: where, and each name up to their end."""
-    heads = {m["name"].lower(): m.start("name") for m in begins.finditer(code) if by_reference.search(m[0])}
+    heads = {m["name"].lower(): m.start("name") for m in begins.finditer(code) if changing.search(m[0])}
     for match in WORD.finditer(code) if heads else ():
         if (name := match[0].lower()) in heads and match.start() != heads[name]:
-            yield from (
-                (match.start(), word)
-                for word in words_of(code[match.end() : match.end() + LONGEST_MOVE].partition(end)[0])
-            )
+            given = code[match.end() : match.end() + LONGEST_MOVE].partition(end)[0]
+            yield from ((match.start(), word) for word in words_of(given))
 
 
 def words_of(text: str) -> frozenset[str]:
