@@ -44,9 +44,8 @@ OTHER = re.compile(rf"{GOES}_REL\b", LINES)
 ROUTINE = re.compile(r"^[ \t]*(?:GLOBAL\s+)?DEF(?:FCT\s+\w+)?\s+(?P<name>\w+)\s*\((?P<parameters>[^)]*)", LINES)
 WAY = re.compile(
     r"^[ \t]*(?:(?P<while>WHILE\b[^\n]*)|(?P<loop>FOR\b[^\n]*|REPEAT|LOOP)|(?P<if>IF\b.*?(?:\bTHEN|$))"
-    r"|(?P<switch>SWITCH\b[^\n]*)|(?P<scope>(?:PTP_)?SPLINE)|(?P<else>CASE)|(?P<otherwise>ELSE|DEFAULT)"
-    r"|(?P<end>END(?:FOR|WHILE|LOOP|IF|SWITCH|SPLINE|FCT)?|UNTIL\b[^\n]*)|(?P<return>RETURN\b[^\n]*)|(?P<break>EXIT))"
-    r"(?!\w)",
+    r"|(?P<switch>SWITCH\b[^\n]*)|(?P<scope>(?:PTP_)?SPLINE)|(?P<else>CASE)|(?P<otherwise>ELSE|DEFAULT)|(?P<break>EXIT)"
+    r"|(?P<end>END(?:FOR|WHILE|LOOP|IF|SWITCH|SPLINE|FCT)?|UNTIL\b[^\n]*)|(?P<return>RETURN\b[^\n]*))(?!\w)",
     LINES,
 )
 JUMP = re.compile(r"\bGOTO[ \t]+(?P<goto>\w+)|^[ \t]*(?P<label>[A-Z]\w*)[ \t]*:", LINES)
@@ -233,7 +232,8 @@ def _poses(code: str, ways: list[Event], nothing: literal.NamedPose) -> Callable
         first = [pose for at, pose in own if any(begin <= at < end for begin, end in lists)]  # there from the beginning
         own += [(at, chosen) for at, one, _ in changes if CHOSEN.search(one) and one.split("[")[0] == array]
         sets = [Event(at, "set", "", pose) for at, pose in own]
-        return set_above([*ways, *sets], (first or [replace(nothing, name=name)])[-1], f"pose of {name}")
+        before = replace(nothing, name=f"{name} before the program assigns it" if own else name)
+        return set_above([*ways, *sets], (first or [before])[-1], f"pose of {name}")
 
     @cache
     def constant(what: str, name: str, value: str) -> literal.NamedPose | None:
