@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from calibrate.correct.corrected import Branch
 from calibrate.correct.programs import literal
-from calibrate.correct.programs.stated_frames import Event, Used, alike, handed_over, routines_of, set_above, words_of
+from calibrate.correct.programs.stated_frames import Event, Used, alike, routines_of, set_above, words_of
 from calibrate.correct.rotations import KUKA
 
 Floats = NDArray[np.float64]
@@ -62,8 +62,7 @@ CHOSEN = re.compile(r"\[(?!\d+\])")  # an index that is no number
 INLINE_FORM = re.compile(r"S(?:BASE|TOOL2?)\s*\(\s*(?P<name>\w+)\s*\)\s*", re.IGNORECASE)
 FIXED = re.compile(r"\$IPO_MODE\s*=\s*#TCP|IPO_FRAME\s+#TCP", re.IGNORECASE)
 DATA_LIST = re.compile(r"^[ \t]*DEFDAT\b.*?^[ \t]*ENDDAT\b", LINES | re.DOTALL)
-NUMBERED = re.compile(r"(?:BASE|TOOL)_DATA\[")
-BY_REFERENCE = re.compile(r"[(,]\s*\w+(?:\[[^\]]*\])?\s*(?:,|$|:\s*OUT)", re.IGNORECASE)
+GIVEN = re.compile(rf"[(,][ \t]*(?P<name>{NAME})[ \t]*(?=[,)])", re.IGNORECASE)
 CALLED = re.compile(r"(?:^|\bDO)[ \t]*(?P<name>[A-Z]\w*)[ \t]*\(", LINES)
 # Statements, and subprograms of the system that leave bases and tools as they are, or are followed (BAS).
 BUILT_IN = literal.built_in(r"""
@@ -115,7 +114,7 @@ def _move(move: literal.Move, own: Used | None) -> literal.Move:
         if alike(place, stated) or not (place.name or place.refused):
             return stated
         why = f"the {word} at the move, {place.name}, is not that of the FDAT of its point, {stated.name}"
-        return place if place.refused else replace(place, refused=why)
+        return replace(place, refused=place.refused or why)
 
     return replace(move, frame=settled(move.frame, own[0], "base"), tool=settled(move.tool, own[1], "tool"))
 
@@ -166,8 +165,7 @@ def _places(code: str) -> tuple[literal.Places, Callable[[str, int], Used | None
     """Base and tool of an instruction, as the program has set them on its way there; of inline forms by FDAT name."""
     ways = routines_of(code, ROUTINE, WAY)
     ways += [Event(m.start(), m.lastgroup or "", (m["goto"] or m["label"]).lower()) for m in JUMP.finditer(code)]
-    fixed = "the tool is stationary (#TCP), which is not corrected" if FIXED.search(code) else ""
-    nothing = literal.NamedPose(refused=fixed)
+    nothing = literal.NamedPose(refused="the tool is stationary (#TCP), not corrected" if FIXED.search(code) else "")
     place = _poses(code, ways, nothing)
     data = dict[str, tuple[str, str]]()  # of inline forms
     for match in INLINE_DATA.finditer(code):
@@ -175,13 +173,11 @@ def _places(code: str) -> tuple[literal.Places, Callable[[str, int], Used | None
         data[match["name"].upper()] = (f"BASE_DATA[{numbers.get('BASE_NO')}]", f"TOOL_DATA[{numbers.get('TOOL_NO')}]")
 
     def inline(fdat: str, at: int) -> Used | None:
-        names = data.get(fdat)
-        return (place("BASE", names[0], at), place("TOOL", names[1], at)) if names else None
+        return (place("BASE", names[0], at), place("TOOL", names[1], at)) if (names := data.get(fdat)) else None
 
     def poses(match: re.Match[str]) -> tuple[literal.NamedPose | None, literal.NamedPose | None]:
         value = match["value"] or ""
-        form = INLINE_FORM.fullmatch(value)
-        fdat = match["inline"] or (form and form["name"])
+        fdat = match["inline"] or ((form := INLINE_FORM.fullmatch(value)) and form["name"])
         unknown = replace(nothing, name=f"FDAT {fdat}")
         base, tool = (inline(fdat.upper(), match.start()) or (unknown, unknown)) if fdat else (None, None)
         what = (match["what"] or match["kind"] or "").upper()
@@ -217,23 +213,20 @@ def _poses(code: str, ways: list[Event], nothing: literal.NamedPose) -> Callable
     assigned = [(match.start("name"), match.end(), _key(match["name"])) for match in CHANGED.finditer(code)]
     times, changes = Counter(name for _, _, name in assigned), list[tuple[int, str, literal.NamedPose]]()
     for begin, end, name in assigned:  # other variables may be local ones of several routines
-        T = held.get(begin) if times[name] == 1 or NUMBERED.match(name) else None
-        changes.append((end, name, replace(nothing, name=name, T=T)))
-    for at, name in handed_over(code, ROUTINE, BY_REFERENCE, "\n"):
-        why = f"{name} may be changed by the routine that line {literal.line_of(code, at)} calls"
-        changes.append((at, _key(name), replace(nothing, refused=why)))
+        T = held.get(begin) if times[name] == 1 or "_DATA[" in name else None
+        why = f"{name} is chosen while the program runs" if CHOSEN.search(name) else ""
+        changes.append((end, name, replace(nothing, name=name, T=T, refused=nothing.refused or why)))
+    given = replace(nothing, refused="its frame is given to a routine, which may change it")
+    changes += [(match.start(), _key(match["name"]), given) for match in GIVEN.finditer(code)]
     lists = [(0, m.start()) for m in (ROUTINE.search(code),) if m] + [m.span() for m in DATA_LIST.finditer(code)]
 
     @cache
     def above(name: str) -> Callable[[int], literal.NamedPose]:
-        array = name.split("[")[0]
-        chosen = replace(nothing, refused=f"an element of {array} is chosen while the program runs")
-        own = [(at, pose) for at, changed, pose in changes if changed in (name, array)]
+        others = {one for _, one, _ in changes if CHOSEN.search(one) and one.split("[")[0] == name.split("[")[0]}
+        own = [(at, pose) for at, changed, pose in changes if changed in {name, *others}]
         first = [pose for at, pose in own if any(begin <= at < end for begin, end in lists)]  # there from the beginning
-        own += [(at, chosen) for at, one, _ in changes if CHOSEN.search(one) and one.split("[")[0] == array]
-        sets = [Event(at, "set", "", pose) for at, pose in own]
-        before = replace(nothing, name=f"{name} before the program assigns it" if own else name)
-        return set_above([*ways, *sets], (first or [before])[-1], f"pose of {name}")
+        first = first or [replace(nothing, name=f"{name} before the program assigns it" if own else name)]
+        return set_above([*ways, *(Event(at, "set", "", one) for at, one in own)], first[-1], f"pose of {name}")
 
     @cache
     def constant(what: str, name: str, value: str) -> literal.NamedPose | None:
@@ -243,7 +236,7 @@ def _poses(code: str, ways: list[Event], nothing: literal.NamedPose) -> Callable
             return replace(nothing, name=name, refused=f"the pose of {name} is chosen while the program runs")
         written = re.fullmatch(AGGREGATE, value.rstrip(), re.IGNORECASE)
         T = _frame(value, *written.span("fields")) if written else None
-        return None if T is None else replace(nothing, name=f"${what}", T=T)
+        return replace(nothing, name=f"${what}", T=T) if T is not None else None
 
     return lambda what, value, at: constant(what, _key(value), value) or above(_key(value))(at)
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from calibrate.correct.corrected import Branch
 from calibrate.correct.programs import literal
-from calibrate.correct.programs.stated_frames import handed_over
+from calibrate.correct.programs.stated_frames import words_of
 from calibrate.correct.rotations import QUATERNION
 
 Floats = NDArray[np.float64]
@@ -54,8 +54,7 @@ ARC = rf"{ROUND}(?:{NAME}(?:\((?:[^();]|\([^();]*\))*\))?|{ROBTARGET.replace('?P
 ARC_END = re.compile(rf"{ARC}(?P<target>\[|{NAME})", re.IGNORECASE)
 INLINE = re.compile(rf"(?:{INSTRUCTION}|{ARC})$", re.IGNORECASE)
 REST = re.compile(r"\bMove\w+\s+(?:\[.*\]\]|\w+)\s*(?P<rest>(?:\\[^,]*)?,.*;)", re.IGNORECASE)
-ROUTINE = re.compile(r"\b(?:PROC|RECORD|FUNC\s+\w+)\s+(?P<name>\w+)(?:\s*\([^)]*)?", re.IGNORECASE)
-BY_REFERENCE = re.compile(r"\b(?:INOUT|VAR|PERS)\b", re.IGNORECASE)
+ROUTINE = re.compile(r"\b(?:PROC|RECORD)\s+(?P<name>\w+)", re.IGNORECASE)
 # Behind the condition of an IF without THEN comes what is no operand any more.
 IF = r"\bIF\b[^;\n]{0,99}?(?<=[\w)}])(?<!\bAND|\bXOR|\bNOT|\bDIV|\bMOD)(?<!\bOR|\bIF)\s+(?!(?:AND|X?OR|DIV|MOD|THEN)\b)"
 CALLED = re.compile(
@@ -155,7 +154,8 @@ def _quarters(confdata: Sequence[tuple[literal.Span, float]]) -> tuple[Branch, l
 def _places(code: str) -> literal.Places:
     """Work object and tool of an instruction; what the program assigns to is known to none before it runs."""
     times = Counter(match["name"].lower() for match in ASSIGNED.finditer(code))
-    given = {name for _, name in handed_over(code, ROUTINE, BY_REFERENCE, ";")}
+    calls = (m for m in _calls(code) if not BUILT_IN.fullmatch(m["name"]))
+    given = {word for m in calls for word in words_of(code[m.end() : m.end() + LONGEST].partition(";")[0])}
     held = {"wobj0": literal.NamedPose("wobj0", np.eye(4)), "tool0": literal.NamedPose("tool0", np.eye(4))}
     for match in (*OBJECT.finditer(code), *TOOL.finditer(code)):
         name, is_object = match["name"], match.re is OBJECT
@@ -163,20 +163,18 @@ def _places(code: str) -> literal.Places:
         for group in ("user", "object") if is_object else ("frame",):
             pose = pose @ RAPID.frame([v for _, v in literal.numbers_in(code, *match.span(group))])
         why = f"{name} is given to a routine that may change it" if name.lower() in given else ""
-        known = times[name.lower()] == 1 and not why
         if is_object and (match["held"].upper(), match["fixed"].upper()) != ("FALSE", "TRUE"):
             why = f"work object {name} is held by a robot or moved by a unit, which is not corrected"
         elif not is_object and match["held"].upper() != "TRUE":
             why = f"tool {name} is stationary, which is not corrected"
-        held[name.lower()] = literal.NamedPose(name, pose if known else None, why)
+        held[name.lower()] = literal.NamedPose(name, pose if times[name.lower()] == 1 else None, why)
     for match in PARAMETER.finditer(code):
         held[match["name"].lower()] = literal.NamedPose(refused=f"{match['name']} is a parameter of its routine")
 
     def places(at: int) -> tuple[literal.NamedPose, literal.NamedPose]:
         end = code.find(";", at, at + literal.LONGEST_MOVE)
         parts = _arguments(code[at : at + literal.LONGEST_MOVE if end < 0 else end])
-        plain = PLAIN.match(parts[0])
-        k = 3 + sum(group is not None for group in plain.groups()) if plain else len(parts) - 1
+        k = 3 + sum(group is not None for group in plain.groups()) if (plain := PLAIN.match(parts[0])) else -1
         last = next((part for part in parts if USED.search(part)), parts[k] if k < len(parts) else "")
         used, tool = USED.search(last), last.split("\\")[0].strip()
         name = used["name"] if used else "wobj0"
@@ -204,8 +202,7 @@ def overshoot(move: literal.Move, joints: Sequence[str]) -> str:
     parts = rest.lstrip(", ").split(",", 2)
     if len(parts) == 3:
         rest = f", {parts[0].strip()}, fine, {parts[2].strip()}"
-    nothing = ", ".join(["9E9"] * 6)
-    return f"{indent}MoveAbsJ [[{', '.join(joints)}], [{nothing}]]{rest}"
+    return f"{indent}MoveAbsJ [[{', '.join(joints)}], [9E9, 9E9, 9E9, 9E9, 9E9, 9E9]]{rest}"
 
 
 RAPID = literal.Dialect("RAPID", "ABB", (".mod", ".prg", ".modx"), find, QUATERNION, True, 4, 8, overshoot)

@@ -6,8 +6,9 @@ at all is that of the rig file. What a program sets holds until it sets another,
 """
 
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from itertools import accumulate
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,9 +20,9 @@ Floats = NDArray[np.float64]
 
 SAME = 2e-6  # m and of a rotation matrix: rounding of what is written
 CALL = re.compile(r"(?:\b(?P<started>DO|run)[ \t]+)?(?<![\w$.#])(?P<name>[A-Z_]\w*)[ \t]*\(", re.IGNORECASE)
-WORD = re.compile(r"[A-Za-z_]\w*")
 BLOCKS = ("if", "switch", "loop", "scope")
 CALLS = ("call", "started")
+TESTED = {"while": "loop", "else": "else"}
 BRANCH = "is set in a branch or a loop above, or not"
 CALLERS = "is not the same at all calls of its routine"
 LABEL = "is not the same on all ways to the label"
@@ -108,9 +109,8 @@ def _unusable(kind: _Kind, used: Sequence[NamedPose], given: Floats | None) -> s
 
 
 def _pose(place: NamedPose, given: Floats | None, otherwise: Floats) -> Floats:
-    if place.T is not None:
-        return place.T
-    return otherwise if given is None else given
+    instead = otherwise if given is None else given
+    return instead if place.T is None else place.T
 
 
 def _same(one: Floats, other: Floats) -> bool:
@@ -152,13 +152,10 @@ def routines_of(
 ) -> list[Event]:
     """Where routines begin, branch and are called; `caller`: with what all but the first are entered from outside."""
     begun = list(begins.finditer(code))
-    events = list[Event]()
-    for match in branches.finditer(code):  # calls in a condition, and in what is returned, come first
-        kind = match.lastgroup or ""
-        if kind in ("while", "else"):  # has a condition of its own, which is tested each time
-            events.append(Event(match.start(), "loop" if kind == "while" else kind))
-            kind = "tested"
-        events.append(Event(match.end(), kind))
+    ways = [(match, match.lastgroup or "") for match in branches.finditer(code)]
+    # Calls in a condition, and in what is returned, come first; conditions of TESTED are theirs, each time.
+    events = [Event(match.start(), TESTED[kind]) for match, kind in ways if kind in TESTED]
+    events += [Event(match.end(), "tested" if kind in TESTED else kind) for match, kind in ways]
     for k, match in enumerate(begun):
         words = words_of(match["parameters"])
         events.append(Event(match.start("name"), "routine", match["name"].lower(), caller if k else None, words))
@@ -170,26 +167,13 @@ def routines_of(
 
 
 def closed(code: str, at: int) -> int:
-    """Where the parenthesis that opens at a place is closed: calls in it come first."""
-    depth = 0
-    for k in range(at, min(len(code), at + LONGEST_MOVE)):
-        depth += (code[k] == "(") - (code[k] == ")")
-        if depth == 0:
-            return k
-    return at
-
-
-def handed_over(code: str, begins: re.Pattern[str], changing: re.Pattern[str], end: str) -> Iterator[tuple[int, str]]:
-    """Calls of routines of the file that may change what they are given: where, and each name up to their end."""
-    heads = {m["name"].lower(): m.start("name") for m in begins.finditer(code) if changing.search(m[0])}
-    for match in WORD.finditer(code) if heads else ():
-        if (name := match[0].lower()) in heads and match.start() != heads[name]:
-            given = code[match.end() : match.end() + LONGEST_MOVE].partition(end)[0]
-            yield from ((match.start(), word) for word in words_of(given))
+    """Where the first parenthesis from a place on is closed, or the place: calls in it come first."""
+    depths = accumulate((letter == "(") - (letter == ")") for letter in code[at : at + LONGEST_MOVE])
+    return next((at + k for k, depth in enumerate(depths) if depth == 0 and code[at + k] == ")"), at)
 
 
 def words_of(text: str) -> frozenset[str]:
-    return frozenset(match[0].lower() for match in WORD.finditer(text))
+    return frozenset(re.findall(r"[a-z_]\w*", text.lower()))
 
 
 class _Flow:

@@ -80,8 +80,7 @@ def _places(code: str) -> literal.Places:
         numbers = [v for _, v in literal.numbers_in(code, *match.span("literal"))] if match["literal"] else []
         line = f"set_tcp of line {literal.line_of(code, match.start())}"
         tool = literal.NamedPose(line, URSCRIPT.frame(numbers) if len(numbers) == 6 else None)
-        words = words_of(match["words"] or "")
-        events.append(Event(closed(code, code.index("(", match.start())), "set", "", tool, words))
+        events.append(Event(closed(code, match.start()), "set", "", tool, words_of(match["words"] or "")))
     above = set_above(events, literal.NamedPose(), "tool")
     return lambda at: (base, above(at))
 

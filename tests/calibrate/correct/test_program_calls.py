@@ -66,7 +66,7 @@ def test_a_target_behind_a_label_is_left_with_its_reason() -> None:
 
 DATA = {metres: base(metres).replace("$BASE", "BASE_DATA[1]") for metres in (3, 4)}
 OTHERS = f"DEFFCT INT check()\n{base(2)}ENDFCT\nDEFFCT INT other(n:IN)\n{base(3)}ENDFCT\nDEF early()\nIF a THEN\n"
-OTHERS += f"RETURN check()\nENDIF\nEND\nDEF init()\n{DATA[3]}t.X = 5\nEND\nDEF shift(f:OUT)\nEND\nDEF show(f:IN)\nEND\n"
+OTHERS += f"RETURN check()\nENDIF\nEND\nDEF init()\n{DATA[3]}t.X = 5\nEND\nDEF shift(f:OUT)\nEND\n"
 USE = f"BAS(#BASE, 1)\n{POINT}"
 FDAT = f"DECL FDAT FP1 = {{TOOL_NO 0, BASE_NO 1}}\nDECL E6POS XP1 = {POINT[4:]}{DATA[4]}"
 WAYS = {  # behind base 1; bases of its moves, None: left
@@ -92,7 +92,7 @@ WAYS = {  # behind base 1; bases of its moves, None: left
     "data behind": (f"{USE}{DATA[3]}{USE}", [None, 3.0]),
     "index": (f"{DATA[3]}BASE_DATA[i].X = 5\n{USE}", [None]),
     "by reference": (f"{DATA[3]}shift(BASE_DATA[1])\n{USE}", [None]),
-    "by value": (f"{DATA[3]}show(BASE_DATA[1])\n{USE}", [3.0]),
+    "not given": (f"{DATA[3]}shift(BASE_DATA[1].X, 2)\n{USE}", [3.0]),
     "a name of two routines": (f"t = {POINT[4:]}init()\n$BASE = t\n{POINT}", [None]),
     "data of a called routine": (f"init()\n{USE}", [3.0]),
 }
@@ -232,9 +232,8 @@ def test_a_work_object_that_a_called_routine_may_change_is_left() -> None:
     pose = "[[0,0,0],[1,0,0,0]]"
     move = "MoveL [[1,2,3],[1,0,0,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]], v50, fine, tool0"
     text = f'PERS wobjdata w1 := [FALSE,TRUE,"",{pose},{pose}];\nPROC main()\nsetup w1;\n{move}\\WObj:=w1;\nENDPROC\n'
-    for head, says in (("INOUT ", "w1 is given to a routine that may change it"), ("", "")):
-        found = rapid.find(f"{text}PROC setup({head}wobjdata w)\nENDPROC\n", 6)
-        assert found.literals[0].used[0][0].refused == says
+    for call, says in (("setup w1;", "w1 is given to a routine that may change it"), ("setup;", "")):
+        assert rapid.find(text.replace("setup w1;", call), 6).literals[0].used[0][0].refused == says
 
 
 def test_the_base_of_a_spline_block_ends_with_the_block() -> None:
