@@ -4,17 +4,14 @@ import sys
 from pathlib import Path
 from typing import Annotated
 
-import msgspec
 from cyclopts import Parameter
 
 from calibeam.console import Console
-from calibeam.printing.proof import print_proof, print_real
+from calibeam.printing.proof import print_proof
 from calibeam.prove.loop import prove_loop, summary
-from calibeam.prove.prove import Plan, ending_early, fresh, prove
+from calibeam.prove.prove import Plan, prove
 from calibeam.prove.raised import TROUBLES
-from calibeam.prove.real import prove_real, write_real_page
 from calibeam.prove.scenario import DEVELOPMENT, KINDS, Kind, Mix
-from calibeam.software import SOFTWARE
 from calibrate.errors import DataError
 from simulators.conceal.wanted import FAMILIES, Family
 
@@ -35,7 +32,6 @@ def prove_command(
     without: Annotated[tuple[str, ...], Parameter(show_default=False)] = (),
     wire: int = 0,
     compare: int = 0,
-    real: Path | None = None,
     loop: Annotated[bool, Parameter(negative=())] = False,
     publish: bool = False,
     json: bool = False,
@@ -76,8 +72,6 @@ def prove_command(
         Further cases whose recordings come over emulated wires: a minute each, two cores.
     compare
         For how many cases an oracle, which knows the truth, and other methods are asked for comparison.
-    real
-        A folder with session folders of real recordings: these are diagnosed, and what is hidden of them inferred.
     loop
         Reconcile each case with the simulation of its rig file instead: how far off it is on unseen rows, before, after
         geometry and after physics. Takes --cases, --wire, --seed, --jobs and --out, and no other option.
@@ -88,9 +82,6 @@ def prove_command(
 
     """
     console = Console(stderr=json)
-    if real is not None:
-        _real(console, real, out, jobs)
-        return
     if loop:
         _loop(console, out, (cases, wire), DEVELOPED_SEED if seed is None else seed, jobs, json=json)
         return
@@ -130,14 +121,3 @@ def _loop(console: Console, out: Path, counts: tuple[int, int], seed: int, jobs:
 
 def _tell(console: Console, word: str) -> None:
     console.print(word, markup=False, highlight=False)
-
-
-def _real(console: Console, data: Path, out: Path, jobs: int) -> None:
-    """Pages of all sets, real.html and real.json in `out`."""
-    folder = fresh(out).out
-    with ending_early(out, lambda word: _tell(console, word), "it begins with an empty folder") as count:
-        sets = prove_real(data, folder, jobs, count)
-    (out / "real.json").write_bytes(msgspec.json.format(msgspec.json.encode(sets), indent=1) + b"\n")
-    write_real_page(out / "real.html", sets, SOFTWARE)
-    print_real(console, sets)
-    console.print(f"page: {out / 'real.html'}", markup=False, highlight=False)

@@ -5,7 +5,6 @@ from collections.abc import Sequence
 from rich.table import Table
 
 from calibeam.console import Console
-from calibeam.prove.real import HiddenAngle, RealScore
 from calibeam.prove.record import CaseScore, ProofFile
 from calibeam.prove.tally import (
     OF_TROUBLES,
@@ -96,36 +95,5 @@ def _shares(others: Sequence[ProofFigure]) -> Table:
     return table
 
 
-def print_real(console: Console, sets: Sequence[RealScore]) -> None:
-    """What is found in real recordings, what remains, and what is inferred of hidden columns."""
-    table = Table(title="real recordings", title_justify="left")
-    for heading in ("set", "samples", "verdict", "geometry, held out", "with physics", "found"):
-        table.add_column(heading)
-    for one in sets:
-        file = one.diagnosis
-        if file is None:
-            table.add_row(one.name, str(one.samples), f"failed: {one.error}")
-            continue
-        found = ", ".join(f"{f.physics} at {f.where}" for f in file.findings)
-        before, after = _um(file.rms_before_m), _um(file.rms_after_m)
-        table.add_row(one.name, str(one.samples), file.verdict, before, after, found)
-    console.print(table)
-    for one in sets:
-        for a in one.angles:
-            console.print(f"{one.name}: {_angle(a)}", highlight=False)
-        for c in one.columns:
-            said = f"{one.name}: {c.column} hidden: {c.physics} at {c.where} over time, correlation {c.correlation:.2f}"
-            console.print(said, highlight=False)
-
-
 def _um(value: float | None) -> str:
     return "-" if value is None else f"{1e6 * value:.3g} µm"
-
-
-def _angle(hidden: HiddenAngle) -> str:
-    if hidden.rms_rad is None or hidden.expected_rad is None:
-        return f"joint {hidden.joint} hidden: the target sits on its axis and does not depend on it"
-    return (
-        f"joint {hidden.joint} hidden at {hidden.poses} poses: inferred to {1e6 * hidden.rms_rad:.0f} µrad rms, "
-        f"expected {1e6 * hidden.expected_rad:.0f}; poses that do not depend on it: {hidden.unfelt}"
-    )

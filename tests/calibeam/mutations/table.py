@@ -120,7 +120,6 @@ OTHER_SESSIONS = (
     Pair("columns/samples.parquet", "predict model.json columns/samples.parquet"),
     Pair("tracker/samples.csv", "batch sets --out fleet --jobs 2", together=20),
     Pair("tracker/rig.toml", "batch sets --out fleet --jobs 2", together=20),
-    Pair("tracker/samples.csv", "prove --real sets --out proof --jobs 2", together=20),
     Pair("recording.mcap", "recover recording.mcap --out made.mcap"),
     Pair("recording.mcap", "report tracker --against recording.mcap"),
     Pair("streams.mcap", "recover streams.mcap --out made.mcap"),

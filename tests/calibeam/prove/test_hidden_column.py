@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from acquisition.recording import Samples
-from calibeam.prove.real import against_hidden, real_sets
+from benchmarks.hidden_columns import against_hidden, real_sets
 from calibrate.diagnose.schema import CurveRecord, DiagnosisFile, FindingRecord
 from calibrate.errors import DataError
 

@@ -5,7 +5,7 @@ from collections.abc import Callable
 import msgspec
 import pytest
 
-from calibeam.prove.real import HiddenAngle, HiddenColumn, RealScore, real_html
+from benchmarks.hidden_columns import HiddenAngle, HiddenColumn, RealScore, real_html
 from calibrate.diagnose.schema import DiagnosisFile, FindingRecord, UnexplainedRecord
 
 SAYS = "joint 2 bends under gravity"

@@ -1,4 +1,4 @@
-"""Real recordings: what is found, what remains, and what is inferred of columns that were hidden on purpose; real.html.
+"""`python -m benchmarks.hidden_columns FOLDER OUT`: real recordings, columns of which were hidden on purpose; real.html.
 
 The hidden column is known to us, so here truth is real and not simulated. A cause that is not recorded can only be met
 as something that changes with time; if the inferred course over time is that of the hidden column, the diagnosis saw
@@ -6,6 +6,7 @@ the cause through the arm. Where a joint column is hidden, the model of all othe
 stood from what the instrument measured.
 """
 
+import sys
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
@@ -15,11 +16,15 @@ import msgspec
 import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
+from rich.table import Table
 
 from acquisition.recording import Recording, Samples, read
 from acquisition.recording.session_folder import CSV, RIG, write_csv
+from calibeam.console import Console
 from calibeam.prove.diagnosing import Answered, diagnose_cases
+from calibeam.prove.prove import ending_early, fresh
 from calibeam.prove.seal import Layout
+from calibeam.software import SOFTWARE
 from calibrate.chain import Chain
 from calibrate.diagnose.file import read_diagnosis
 from calibrate.diagnose.fitted import Fitted, fit_geometry
@@ -37,6 +42,7 @@ from calibrate.report.tones import Tone
 Floats = NDArray[np.float64]
 
 FEWEST = 20  # points of a curve
+JOBS = 2  # processes
 
 
 @dataclass(frozen=True)
@@ -353,3 +359,53 @@ def _m(value: float | None) -> str:
 
 def _rad(value: float | None) -> str:
     return DASH if value is None else angle(value)
+
+
+def print_real(console: Console, sets: Sequence[RealScore]) -> None:
+    """What is found in real recordings, what remains, and what is inferred of hidden columns."""
+    table = Table(title="real recordings", title_justify="left")
+    for heading in ("set", "samples", "verdict", "geometry, held out", "with physics", "found"):
+        table.add_column(heading)
+    for one in sets:
+        file = one.diagnosis
+        if file is None:
+            table.add_row(one.name, str(one.samples), f"failed: {one.error}")
+            continue
+        found = ", ".join(f"{f.physics} at {f.where}" for f in file.findings)
+        before, after = _um(file.rms_before_m), _um(file.rms_after_m)
+        table.add_row(one.name, str(one.samples), file.verdict, before, after, found)
+    console.print(table)
+    for one in sets:
+        for a in one.angles:
+            console.print(f"{one.name}: {_angle(a)}", highlight=False)
+        for c in one.columns:
+            said = f"{one.name}: {c.column} hidden: {c.physics} at {c.where} over time, correlation {c.correlation:.2f}"
+            console.print(said, highlight=False)
+
+
+def _um(value: float | None) -> str:
+    return "-" if value is None else f"{1e6 * value:.3g} µm"
+
+
+def _angle(hidden: HiddenAngle) -> str:
+    if hidden.rms_rad is None or hidden.expected_rad is None:
+        return f"joint {hidden.joint} hidden: the target sits on its axis and does not depend on it"
+    return (
+        f"joint {hidden.joint} hidden at {hidden.poses} poses: inferred to {1e6 * hidden.rms_rad:.0f} µrad rms, "
+        f"expected {1e6 * hidden.expected_rad:.0f}; poses that do not depend on it: {hidden.unfelt}"
+    )
+
+
+def main(data: Path, to: Path) -> None:
+    """Pages of all sets, real.html and real.json in the empty folder `to`."""
+    console, folder = Console(), fresh(to).out
+    with ending_early(to, lambda word: console.print(word, markup=False), "it begins with an empty folder") as count:
+        sets = prove_real(data, folder, JOBS, count)
+    (to / "real.json").write_bytes(msgspec.json.format(msgspec.json.encode(sets), indent=1) + b"\n")
+    write_real_page(to / "real.html", sets, SOFTWARE)
+    print_real(console, sets)
+    print(f"page: {to / 'real.html'}")
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]), Path(sys.argv[2]))
