@@ -201,6 +201,7 @@ class ModelFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     needs: Many[Name] = ()
     session: SessionRecord | None = None
     measured_sha256: Label | None = None  # and which measurements; absent in models of earlier versions
+    left_m: Statistic | None = None  # of a coordinate of the target, what unseen rows show beyond its sigma
     dh_table: Many[ModelParameter] = ()  # of an arm that was fitted as poses: corrections of its standard D-H table
 
     def made_of(self, samples: Samples) -> bool | None:

@@ -10,8 +10,11 @@ from calibrate.identification.estimates import Estimate
 from calibrate.identification.result import Evidence, FreeSpace
 from calibrate.model_file import BootstrapRecord, FreeSpaceRecord, ModelParameter, ObservabilityRecord, UnseenRows
 from calibrate.observability import Observability
-from calibrate.uncertainty.held_out import Bootstrap
+from calibrate.sensors.catalogue import kind_of
+from calibrate.sensors.kind import Trait
+from calibrate.uncertainty.held_out import Bootstrap, beyond_sigma
 
+AXES = 3  # of a position
 REACH_95 = 1.959963984540054  # of a normal law: half of a 95 % interval in sigmas
 
 
@@ -23,6 +26,7 @@ class EvidenceFields(TypedDict):
     observability: ObservabilityRecord | None
     free_space: FreeSpaceRecord | None
     bootstrap: BootstrapRecord | None
+    left_m: float
 
 
 def evidence_fields(evidence: Evidence) -> EvidenceFields:
@@ -46,6 +50,14 @@ def evidence_fields(evidence: Evidence) -> EvidenceFields:
         observability=None if shown is None else _observability(shown),
         free_space=None if room is None else _free_space(room),
         bootstrap=None if drawn is None else BootstrapRecord(len(drawn.theta) + drawn.failed, drawn.failed),
+        left_m=beyond_sigma(
+            [
+                (AXES * u.observations, rms_m, rms_m / u.chi_predicted)
+                for u in evidence.proven.held_out
+                if Trait.IN_SPACE in kind_of(u.name).traits and u.chi_predicted > 0.0
+                for rms_m in [u.rms_distance_after_m / AXES**0.5]
+            ]
+        ),
     )
 
 

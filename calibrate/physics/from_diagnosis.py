@@ -17,7 +17,7 @@ from acquisition.recording.samples import measured_sha256
 from calibrate.diagnose.bench import Bench
 from calibrate.diagnose.blunders_first import Cleared
 from calibrate.diagnose.curve import Curve
-from calibrate.diagnose.diagnosis import UNKNOWN, Finding
+from calibrate.diagnose.diagnosis import UNKNOWN, Diagnosis, Finding
 from calibrate.diagnose.extended import NEARLY, alike
 from calibrate.diagnose.findings import named
 from calibrate.diagnose.fitted import Fitted
@@ -61,7 +61,9 @@ from calibrate.predict import Predictor
 from calibrate.problem import whitener_of
 from calibrate.sensors.catalogue import kind_of
 from calibrate.sensors.encoder_difference import NAME as ENCODER_DIFFERENCE
+from calibrate.sensors.kind import Trait
 from calibrate.uncertainty.fit_statistics import against_stated
+from calibrate.uncertainty.held_out import beyond_sigma
 from calibrate.variance import TOLD, VarianceFactors
 from calibrate.weighting import JOINT, Weighting
 
@@ -76,6 +78,7 @@ LEAST_CURVED = 0.1  # of a t law: with more outlying rows than good ones nothing
 LEAST_VARIANCE = 1e-6  # of the assumed one, of a source that is not there
 SAME_VARIANCE = 1e-3  # of itself, 0.05 % of a sigma
 TURNS = 30
+AXES = 3  # of a position
 KNOTS = 33  # of a curve: a wave of the finest of eight eigenfunctions has eight of them
 UNITS = ("rad_nm", "per_k", "rad", "m", "s", "nm", "share", "k")
 
@@ -91,7 +94,21 @@ def model_of_diagnosis(found: Diagnosed, recording: Recording) -> ModelFile:
         )
     fit, findings = found.physics.model, found.physics.diagnosis.findings
     says = "geometry and effects fitted together by the diagnosis"
-    return model_of_fit(fit, found.physics.geometry, found.cleared, recording, says, findings)
+    model = model_of_fit(fit, found.physics.geometry, found.cleared, recording, says, findings)
+    return structs.replace(model, left_m=_left_m(found.physics.diagnosis, model))
+
+
+def _left_m(diagnosis: Diagnosis, model: ModelFile) -> float:
+    """By the splits of the proof; what a fit of so many values adds to the noise on rows like its own is no fault."""
+    floors = {floor.instrument: floor.rms_m for floor in diagnosis.floors}
+    grown = np.sqrt(1.0 + model.rank / (AXES * model.poses))
+    return beyond_sigma(
+        [
+            (AXES * held.observations, held.rms_after_m, float(grown) * floors[held.instrument])
+            for held in diagnosis.proofs
+            if Trait.IN_SPACE in kind_of(held.instrument).traits and floors.get(held.instrument)
+        ]
+    )
 
 
 def model_of_fit(

@@ -36,6 +36,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 
 POSTURES = 500  # the motion that lies best settles to about 2 %
+XYZ = ("x_m", "y_m", "z_m")
 SEED = 1  # of the postures: the same model always has the same frame
 
 
@@ -115,7 +116,22 @@ def predict_with_physics(model: ModelFile, samples: Samples, same_session: bool 
     """
     predictor = Predictor.of(model)
     applied = effects_at(model, predictor, samples, same_session)
-    return Predicted(_with_sigma(model, predictor, samples, applied), applied.outside, applied.notes)
+    notes = (*applied.notes, *_of_left(model))
+    return Predicted(_with_sigma(model, predictor, samples, applied), applied.outside, notes)
+
+
+def left_m(model: ModelFile) -> float:
+    """Of a coordinate, what rows that the fit has not seen show beyond its sigma."""
+    return model.left_m or 0.0
+
+
+def _of_left(model: ModelFile) -> tuple[str, ...]:
+    if left_m(model) == 0.0:
+        return ()
+    return (
+        f"rows that the fit had not seen are missed by {1e6 * left_m(model):.2g} µm a coordinate beyond noise and its "
+        "own uncertainty; every sigma of a position contains it",
+    )
 
 
 def as_fitted(model: ModelFile, samples: Samples, misfits: Sequence[tuple[str, Ints, Floats]]) -> ModelFile:
@@ -162,7 +178,11 @@ def _with_sigma(model: ModelFile, predictor: Predictor, samples: Samples, applie
     by = applied.by
     read = reading(predictor, by)
     variance = _variance(model, predictor, applied, at, tuple(read))
-    sigma = {f"s_{c}": np.where(np.isfinite(read[c]), np.sqrt(np.maximum(v, 0.0)), np.nan) for c, v in variance.items()}
+    left = {c: left_m(model) ** 2 for c in XYZ}
+    sigma = {
+        f"s_{c}": np.where(np.isfinite(read[c]), np.sqrt(np.maximum(v, 0.0) + left.get(c, 0.0)), np.nan)
+        for c, v in variance.items()
+    }
     return {"t_s": samples.column("t_s")} | read | sigma | residuals(predictor, read, samples)
 
 
@@ -299,7 +319,9 @@ def placed(
 
     variance = _variance(model, predictor, applied, at, PLACED)
     sigma = np.sqrt(np.maximum(np.stack([variance[c] for c in PLACED], axis=1), 0.0))
-    return Placed(T, sigma[:, :6], tip_at(predictor, T), sigma[:, 6:], applied.outside, applied.notes)
+    sigma[:, [0, 1, 2, 6, 7, 8]] = np.hypot(sigma[:, [0, 1, 2, 6, 7, 8]], left_m(model))
+    notes = (*applied.notes, *_of_left(model))
+    return Placed(T, sigma[:, :6], tip_at(predictor, T), sigma[:, 6:], applied.outside, notes)
 
 
 @dataclass(frozen=True, eq=False)

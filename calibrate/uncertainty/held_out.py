@@ -10,7 +10,7 @@ own, so their centres are drawn again as well. Sources: Efron, Tibshirani, An In
 9.5 (pairs) and 13.3 (percentiles); block bootstrap for rows that belong together: Kuensch, Ann. Statist. 17(3), 1989.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
 from typing import Protocol, Self, TypeVar
@@ -98,6 +98,7 @@ P = TypeVar("P", bound=Cuttable)
 
 SEEN = 1e-9  # of the largest singular value of scaled columns: rounding is at 1e-16, what rows see at 1e-3 and above
 
+CHANCE = 2.33  # standard deviations of a mean square: one in a hundred by chance
 USABLE = (Status.CONVERGED, Status.RANK_DEFICIENT)  # unseen combinations do not spoil a prediction of like rows
 
 
@@ -164,6 +165,17 @@ def held_out(
         tuple(dict.fromkeys(name for fold in folds for name in fold.refitted)),
         tuple(fold.measured for fold in folds),
     )
+
+
+def beyond_sigma(splits: Sequence[tuple[int, float, float]]) -> float:
+    """What rows that a fit has not seen are missed by beyond noise and its own uncertainty, root mean square; 0 where
+    chance explains it. Of each way to split: how many values, their rms, and the rms to be expected.
+    """
+    squares = [
+        n * (rms**2 - expected**2) if rms**2 > expected**2 * (1.0 + CHANCE * np.sqrt(2.0 / n)) else 0.0
+        for n, rms, expected in splits
+    ]
+    return float(np.sqrt(sum(squares) / sum(n for n, _, _ in splits))) if splits else 0.0
 
 
 def _fold(
