@@ -1,4 +1,4 @@
-"""`python -m benchmarks.hidden_columns FOLDER OUT`: real recordings, columns of which were hidden on purpose; real.html.
+"""`python -m benchmarks.hidden_columns FOLDER OUT`: real recordings, columns of which were hidden; real.html.
 
 The hidden column is known to us, so here truth is real and not simulated. A cause that is not recorded can only be met
 as something that changes with time; if the inferred course over time is that of the hidden column, the diagnosis saw

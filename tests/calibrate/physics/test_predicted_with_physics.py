@@ -4,9 +4,13 @@ import json
 
 import numpy as np
 import pytest
+from msgspec import structs
 
+from acquisition.recording.rig import parse_rig
+from acquisition.recording.session_folder import read_csv
 from calibeam.cli import run
 from calibrate.model_file import read_model
+from calibrate.physics.predicting import predict_with_physics
 from tests.support.halves import OBSERVED, diagnosed_and_predicted, inside_95, judged, numbers, table_of, written_halves
 
 
@@ -167,3 +171,14 @@ FAULTS = [
     (_no_joint, "session.conditions.q1_rad: missing or empty"),
     (_unknown_place, "joint77.angle"),
 ]
+
+
+def test_what_unseen_rows_showed_is_in_every_sigma_of_a_position(slipped):
+    folder, unseen, *_ = slipped
+    model = read_model(folder / "model.json")
+    rows = read_csv(unseen, parse_rig(model.rig.text, "rig.toml"))
+    assert model.left_m is not None
+    sure, unsure = (predict_with_physics(structs.replace(model, left_m=left_m), rows) for left_m in (0.0, 2e-5))
+    for name in ("s_x_m", "s_y_m", "s_z_m"):
+        assert unsure.columns[name] == pytest.approx(np.hypot(sure.columns[name], 2e-5))
+    assert len(unsure.notes) == len(sure.notes) + 1

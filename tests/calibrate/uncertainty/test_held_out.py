@@ -13,7 +13,7 @@ from calibrate.identifiability import analyse
 from calibrate.joint_problem import JointProblem
 from calibrate.problem import Problem
 from calibrate.redundant import reduced
-from calibrate.uncertainty.held_out import Proof, held_out
+from calibrate.uncertainty.held_out import Proof, beyond_sigma, held_out
 from calibrate.uncertainty.splits import at_random, by_place, last_block
 
 
@@ -98,3 +98,12 @@ def test_a_place_left_out_stands_where_its_own_rows_say_and_proves_the_arm(dual_
     assert 0.8 < found.chi < 4.0
     bent = problem.with_parameters(tuple(replace(p, free=p.free and p.unit == "m") for p in problem.parameters))
     assert held_out(bent, by_place(placement), solve(bent).theta).chi > 10.0 * found.chi
+
+
+def test_what_unseen_rows_show_beyond_sigma_is_no_chance():
+    expected_m = 1e-5
+    assert beyond_sigma([(100, 1.1e-5, expected_m)]) == 0.0  # two in a hundred such means are as large
+    assert beyond_sigma([(100, 1.5e-5, expected_m)]) == pytest.approx(np.sqrt(1.5**2 - 1.0) * 1e-5)
+    half = beyond_sigma([(100, 1.5e-5, expected_m), (100, 0.9e-5, expected_m)])
+    assert half == pytest.approx(np.sqrt((1.5**2 - 1.0) / 2.0) * 1e-5)
+    assert beyond_sigma([]) == 0.0
