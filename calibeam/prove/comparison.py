@@ -28,6 +28,7 @@ from calibrate.diagnose.fitted import Fitted, fit_geometry
 from calibrate.diagnose.folds import splits_of
 from calibrate.diagnose.line_search import refined
 from calibrate.diagnose.linearised import Accepted, Unseen
+from calibrate.diagnose.scatter import sigma_about_zero
 from calibrate.diagnose.schema import DiagnosisFile, FindingRecord
 from calibrate.diagnose.score import scores
 from calibrate.diagnose.session import session_of
@@ -125,7 +126,7 @@ def misfit_m(unseen: Sequence[Unseen], wild: NDArray[np.bool_] | None = None) ->
 
 def wild_of(misfit: Floats) -> NDArray[np.bool_]:
     """(reading,) by the spread of the best model, for all methods alike."""
-    return np.abs(misfit) > WILD * float(np.median(np.abs(misfit))) / 0.6745
+    return np.abs(misfit) > WILD * sigma_about_zero(misfit)
 
 
 def rms_m(misfit: Floats) -> float:
@@ -200,7 +201,7 @@ def _rival(method: Method, rest: _Rest) -> BaselineScore:
     left: list[Unseen] = []
     says = ""
     for seen, unseen in zip(rest.fold.geometry.held_out(rest.fold.train), rest.plain, strict=True):
-        scale = np.median(np.abs(seen.misfit), axis=0) / 0.6745
+        scale = sigma_about_zero(seen.misfit, axis=0)
         learnt = method.learn(X[seen.sample], _tame(seen.misfit / scale), X[unseen.sample], names)
         missed = unseen.misfit - learnt.predicted * scale
         left.append(Unseen(unseen.instrument, unseen.sample, missed, unseen.whitened))

@@ -33,6 +33,7 @@ from calibeam.prove.scenario import Scenario
 from calibeam.prove.seal import Layout
 from calibeam.prove.unseen import LaserBeam, Tool, read_unseen
 from calibrate.diagnose.file import read_diagnosis
+from calibrate.diagnose.scatter import sigma_about_zero
 from calibrate.diagnose.schema import DiagnosisFile, FindingRecord, NameRecord
 
 
@@ -108,8 +109,7 @@ def floor_m(samples: Samples, truth: Truth, family: str) -> float | None:
         return None
     noise = noise_m(samples, truth, family)
     size = np.max(np.abs(noise), axis=1)
-    middle = float(np.median(np.abs(noise))) / 0.6745
-    return float(np.sqrt(np.mean(noise[size <= WILD * middle] ** 2)))
+    return float(np.sqrt(np.mean(noise[size <= WILD * sigma_about_zero(noise)] ** 2)))
 
 
 REACH_M = (0.08, 0.45)  # along a beam: from the nearest to the farthest detector of a session

@@ -10,6 +10,7 @@ from typing import Protocol, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from calibrate.diagnose.scatter import sigma_about_zero
 from calibrate.effects.drivers import Drivers
 from calibrate.effects.term import Term
 
@@ -59,7 +60,7 @@ def tame(misfit: Floats, least: float) -> NDArray[np.bool_]:
     """(observation,) that are not wild by the spread of all (observation, k), `least` at least: a gross error no model
     is to blame for. Where each would be wild, the spread shows nothing, and none is.
     """
-    spread = max(float(np.median(np.abs(misfit))) / 0.6745, least)
+    spread = max(float(sigma_about_zero(misfit)), least)
     near = np.max(np.abs(misfit), axis=1) <= WILD * spread
     return near | ~np.any(near)
 

@@ -20,6 +20,7 @@ TURNS = 20
 SETTLED = 1e-4  # of -2 log L per observation
 FLOOR = 1e-6  # of the assumed noise: perfect data have a scale, too
 ROUNDING = 1e-14  # of the largest variance: fewer rows than columns, or one bound to others, leave directions without
+MEDIAN_OF_SIZES = 0.6745  # of |x|, x normal with sigma 1
 LOG_RATIO = (-18.0, 18.0)  # of variance by joints over own variance, as assumed both
 
 
@@ -31,6 +32,15 @@ class Scatter:
     weights: Floats  # (row,) 1 is fully trusted
     minus_two_log_likelihood: float
     free: int  # numbers estimated
+
+
+def sigma_about_zero(values: Floats, axis: int | None = None) -> Floats:
+    """One sigma of normal noise of mean zero from the median of |values|; gross errors hardly change it.
+
+    Of all `values` (any shape), or along `axis`, in their unit. A common offset counts as noise: subtract it before.
+    Source: Huber, Ronchetti, Robust Statistics, 2nd ed. 2009, chapter 5 (the median absolute deviation, about zero).
+    """
+    return np.asarray(np.median(np.abs(values), axis=axis) / MEDIAN_OF_SIZES, dtype=np.float64)
 
 
 def scatter_of(residual: Floats, by_joint: Floats, own_sigma: Floats) -> Scatter:
@@ -58,7 +68,7 @@ def likelihood_of(residual: Floats, covariance: Floats) -> tuple[float, Floats]:
 def _of_one_form(residual: Floats, own_sigma: Floats) -> Scatter:
     n, k = residual.shape
     z = residual / own_sigma
-    form, last = np.diag((np.median(np.abs(z), axis=0) / 0.6745 + FLOOR) ** 2), np.inf
+    form, last = np.diag((sigma_about_zero(z, axis=0) + FLOOR) ** 2), np.inf
     for _ in range(TURNS):
         L = np.linalg.cholesky(form)
         square = np.sum(np.linalg.solve(L, z.T) ** 2, axis=0)

@@ -16,6 +16,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from calibrate.diagnose.streams.track import SIGMA_OF_MEDIAN
+
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 
@@ -50,7 +52,7 @@ def fit(X: Floats, y: Floats, block: Ints, rounds: int = 4) -> Line | None:
     for again in range(rounds):
         if again:
             residual = y - Z @ b
-            spread = 1.4826 * _middle(np.abs(residual), deciding)
+            spread = SIGMA_OF_MEDIAN * _middle(np.abs(residual), deciding)
             if spread <= 0.0:
                 break
             weight = np.minimum(1.0, HUBER * spread / np.maximum(np.abs(residual), 1e-300))

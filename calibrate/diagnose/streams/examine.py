@@ -29,7 +29,7 @@ from calibrate.diagnose.streams.told import (
     told_slip,
     told_unsettled,
 )
-from calibrate.diagnose.streams.track import Track
+from calibrate.diagnose.streams.track import SIGMA_OF_MEDIAN, Track
 
 Floats = NDArray[np.float64]
 Predicted = Callable[[Floats, Floats], Floats]  # (row, joint) rad and (row,) joints' clock -> (row, 4) spots, NaN: none
@@ -170,7 +170,7 @@ def _alike(lags: Sequence[Following]) -> list[int]:
     if not behind:
         return []
     usual = float(np.median(list(behind.values())))
-    scatter = 1.4826 * float(np.median([abs(b - usual) for b in behind.values()]))
+    scatter = SIGMA_OF_MEDIAN * float(np.median([abs(b - usual) for b in behind.values()]))
     return [c for c, b in behind.items() if abs(b - usual) <= max(3.0 * scatter, SMALLEST_S)]
 
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from acquisition.recording import Recording, Stream
 from calibrate.diagnose.streams.coarse_clock import Ticks, straight_line
-from calibrate.diagnose.streams.track import Track
+from calibrate.diagnose.streams.track import SIGMA_OF_MEDIAN, Track
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -60,7 +60,7 @@ def stamps_scatter_s(device: Device) -> float:
     if line is None:
         return float("inf")
     late_s = (device.host_s - line[0] - line[1] * device.track.time_s)[_prompt(device)]
-    return 1.4826 * float(np.median(np.abs(late_s))) / line[1]
+    return SIGMA_OF_MEDIAN * float(np.median(np.abs(late_s))) / line[1]
 
 
 def _stream(recording: Recording, channel: str) -> Stream | None:

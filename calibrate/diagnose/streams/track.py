@@ -16,6 +16,7 @@ Ints = NDArray[np.intp]
 
 GAP_PERIODS = 5.0  # a longer pause is not bridged by a curve: an arm can do anything meanwhile
 FEWEST = 4  # points of a cubic
+SIGMA_OF_MEDIAN = 1.4826  # 1 / 0.67449: sigma of normal noise over the median of its absolute values
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,4 +107,4 @@ def white_noise(values: Floats) -> Floats:
     if len(values) < FEWEST:
         return np.full(values.shape[1], np.nan)
     second = values[:-2] - 2.0 * values[1:-1] + values[2:]
-    return 1.4826 * np.median(np.abs(second), axis=0) / np.sqrt(6.0)
+    return SIGMA_OF_MEDIAN * np.median(np.abs(second), axis=0) / np.sqrt(6.0)

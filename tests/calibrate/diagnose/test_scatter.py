@@ -1,9 +1,10 @@
 """Noise of an instrument from its residuals alone."""
 
 import numpy as np
+import pytest
 
 from calibrate.diagnose.linearised import tame
-from calibrate.diagnose.scatter import scatter_of
+from calibrate.diagnose.scatter import scatter_of, sigma_about_zero
 
 
 def test_columns_that_follow_others_have_a_noise_too() -> None:
@@ -23,3 +24,11 @@ def test_a_gross_error_is_not_tame_and_readings_of_which_each_seems_wild_all_are
     one_component = 1e-9 * misfit
     one_component[:, 2] = 1.0
     assert np.all(tame(one_component, 1e-300))
+
+
+def test_sigma_about_zero_is_that_of_normal_noise_and_hardly_follows_gross_errors() -> None:
+    noise = np.random.default_rng(3).standard_normal((4000, 2)) * [1e-3, 5e-3]
+    assert sigma_about_zero(noise, axis=0) == pytest.approx([1e-3, 5e-3], rel=0.05)
+    noise[::50] += 1.0
+    assert sigma_about_zero(noise, axis=0) == pytest.approx([1e-3, 5e-3], rel=0.08)
+    assert sigma_about_zero(noise[:, 0] + 1.0) == pytest.approx(1.0 / 0.6745, rel=0.01)  # about zero: offsets count
