@@ -24,9 +24,9 @@ def _terms(drivers: Drivers) -> tuple[Term, ...]:
         if loaded(drivers, joint):
             out += [_stiff(drivers, joint), _knee(drivers, joint), _stiffening(drivers, joint)]
             corrected = by_corrected(drivers, by)
-            out += [_weighed(drivers, joint, corrected, stated=True)] if corrected is not None else []
+            out += [_weighed(drivers, joint, corrected)] if corrected is not None else []
         elif (unknown := by_unknown(drivers, by, joint)) is not None:
-            out.append(_weighed(drivers, joint, unknown, stated=False))
+            out.append(_weighed(drivers, joint, unknown))
     return tuple(out)
 
 
@@ -57,27 +57,23 @@ def _stiff(drivers: Drivers, joint: int) -> Term:
     )
 
 
-def _weighed(drivers: Drivers, joint: int, weighed: Weighed, *, stated: bool) -> Term:
+def _weighed(drivers: Drivers, joint: int, weighed: Weighed) -> Term:
     """One stiffness, under masses that are off by what stated masses are, or that nobody states."""
     port, direction = at_joint(joint, drivers.n_joints)
-    corrections = tuple(f"mass_correction{k}_rad_nm" for k in range(1, weighed.columns))
-    combined = f"Joint {joint} yields under its load ({{combination1_rad}} rms): elastic drive; masses are not known"
+    stated = f"Joint {joint} yields {{compliance_rad_nm}}: elastic drive; stated masses are off"
+    unknown = f"Joint {joint} yields under its load ({{combination1_rad}} rms): elastic drive; masses are not known"
     return Form(
         port,
         (f"gravity_torque{joint}",),
         Shape.LINEAR,
         "joint-compliance",
-        variant="masses corrected" if stated else "unknown masses",
+        variant=weighed.variant,
         function=lambda drivers, inner: weighed.at(drivers)[:, 0],
-        names=("compliance_rad_nm", *corrections) if stated else weighed.names("compliance_rad_nm"),
-        limit=LIMIT_RAD_NM if stated else LIMIT_RAD,
-        sentence=f"Joint {joint} yields {{compliance_rad_nm}}: elastic drive; stated masses are off"
-        if stated
-        else combined,
+        names=weighed.names,
+        limit=LIMIT_RAD_NM if weighed.stated else LIMIT_RAD,
+        sentence=stated if weighed.stated else unknown,
         directions=direction,
-        believable=(lambda coefficients, inner: yields(coefficients, weighed.corrections))
-        if stated
-        else weighed.believable,
+        believable=weighed.believable,
     )
 
 

@@ -1,11 +1,11 @@
 """Bending link: the weight behind it bends a link about its own axes."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
 from calibrate.effects.drivers import Drivers
-from calibrate.effects.form import Believable, Floats, Form
+from calibrate.effects.form import Floats
 from calibrate.effects.gravity import bending_nm, weights_n
 from calibrate.effects.kind import Kind
 from calibrate.effects.link_span import SHORTEST_M, beyond_end_m, link_vectors
@@ -13,7 +13,7 @@ from calibrate.effects.loads import Load, carried, states_masses
 from calibrate.effects.ports import Place, Port
 from calibrate.effects.term import Shape, Term
 from calibrate.effects.time_laws import varies
-from calibrate.effects.weighed import By, Weighed, by_corrected, by_stated, by_unknown, yields
+from calibrate.effects.weighed import By, Weighed, by_corrected, by_stated, by_unknown, soft
 from calibrate.rigid import cross
 
 LIMIT_RAD_NM = 5e-4  # ten times the softest link of a small arm (mismatch catalogue: 1 to 50 µrad per Nm)
@@ -30,14 +30,19 @@ def _terms(drivers: Drivers) -> tuple[Term, ...]:
 
 def _of_link(drivers: Drivers, link: int) -> list[Term]:
     by = _bent(link)
+    torques = f"gravity_torque{link}", f"gravity_torque{link + 1}"
+    where = Port(f"link{link}.tilt", Place.FRAME, link), torques, Shape.LINEAR, "link-bending"
     if not states_masses(drivers.rig):
         unknown = by_unknown(drivers, by, link + 1)
-        return [] if unknown is None else [_unknown_masses(link, unknown)]
+        sentence = f"Link {link} bends under its load ({{combination1_rad}} rms): soft; masses are not known"
+        return [] if unknown is None else [soft(where, unknown, LIMIT_RAD, sentence)]
     if not varies(bending_nm(drivers, link, carried(drivers)).sum(axis=2)):
         return []
     plain, corrected = by_stated(by), by_corrected(drivers, by)
-    terms = [_stated(link, plain, ""), _each_way(link)]
-    return terms if corrected is None else [*terms, _stated(link, corrected, "masses corrected")]
+    bends = f"Link {link} bends by {{compliance_rad_nm}}: soft"
+    two = f"Link {link} bends by {{compliance_u_rad_nm}} one way, {{compliance_v_rad_nm}} the other: soft"
+    terms: list[Term] = [soft(where, plain, LIMIT_RAD_NM, bends), soft(where, _each_way(link), LIMIT_RAD_NM, two)]
+    return terms if corrected is None else [*terms, soft(where, corrected, LIMIT_RAD_NM, bends)]
 
 
 def _bent(link: int, way: int | None = None) -> By:
@@ -74,61 +79,12 @@ def _across(moment: Floats, along: Floats, way: int | None) -> Floats:
     return first if way == 0 else across - first
 
 
-def _stated(link: int, weighed: Weighed, variant: str) -> Term:
-    return _term(
-        link,
-        lambda drivers, inner: weighed.at(drivers),
-        variant,
-        ("compliance_rad_nm", *(f"mass_correction{k}_rad_nm" for k in range(1, weighed.columns))),
-        f"Link {link} bends by {{compliance_rad_nm}}: soft",
-        lambda coefficients, inner: yields(coefficients, weighed.corrections),
-    )
-
-
-def _each_way(link: int) -> Term:
+def _each_way(link: int) -> Weighed:
     ways = [by_stated(_bent(link, way)) for way in (0, 1)]
-    return _term(
-        link,
-        lambda drivers, inner: np.concatenate([way.at(drivers) for way in ways], axis=2),
-        "each way its own",
+    return Weighed(
+        lambda drivers: np.concatenate([way.at(drivers) for way in ways], axis=2),
         ("compliance_u_rad_nm", "compliance_v_rad_nm"),
-        f"Link {link} bends by {{compliance_u_rad_nm}} one way, {{compliance_v_rad_nm}} the other: soft",
-        lambda coefficients, inner: yields(coefficients),
-    )
-
-
-def _unknown_masses(link: int, weighed: Weighed) -> Term:
-    return _term(
-        link,
-        lambda drivers, inner: weighed.at(drivers),
-        "unknown masses",
-        weighed.names("compliance_rad_nm"),
-        f"Link {link} bends under its load ({{combination1_rad}} rms): soft; masses are not known",
-        weighed.believable,
-        LIMIT_RAD,
-    )
-
-
-def _term(
-    link: int,
-    function: Callable[[Drivers, Floats], Floats],
-    variant: str,
-    names: tuple[str, ...],
-    sentence: str,
-    believable: Believable,
-    limit: float = LIMIT_RAD_NM,
-) -> Term:
-    return Form(
-        Port(f"link{link}.tilt", Place.FRAME, link),
-        (f"gravity_torque{link}", f"gravity_torque{link + 1}"),
-        Shape.LINEAR,
-        "link-bending",
-        variant=variant,
-        function=function,
-        names=names,
-        limit=limit,
-        sentence=sentence,
-        believable=believable,
+        "each way its own",
     )
 
 

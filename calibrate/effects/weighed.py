@@ -13,12 +13,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibrate.effects.drivers import Drivers
+from calibrate.effects.form import Form
 from calibrate.effects.loads import Load, carried, doubts, payload, unit_loads
+from calibrate.effects.ports import Port
+from calibrate.effects.term import Shape
 from calibrate.effects.time_laws import varies
 
 Floats = NDArray[np.float64]
 By = Callable[[Drivers, Sequence[Load]], Floats]  # (pose, width, load) what each load adds per unit of compliance
+Where = tuple[Port, tuple[str, ...], Shape, str]  # of a term: what it moves, by which drivers, its shape and physics
 
+COMPLIANCE = "compliance_rad_nm"
 STRONGEST = 4  # combinations of unknown masses
 CORRECTIONS = 3  # strongest combinations of what stated masses may be off by
 WEAKEST = 0.03  # of the strongest: below, a combination is not worth its column
@@ -32,18 +37,29 @@ class Weighed:
     """Columns of one variant; combinations are chosen once, so that coefficients keep their meaning."""
 
     at: Callable[[Drivers], Floats]  # (pose, width, m)
-    columns: int
-    corrections: int = 0  # columns that mend the first one, in sigmas of the stated masses
-    payload: bool = False  # whether the last column is that of the payload, the only one of known mass
-
-    def names(self, compliance: str) -> tuple[str, ...]:
-        """Of the columns of unknown masses: rms of each combination, and what a payload shows of compliance."""
-        combinations = tuple(f"combination{k}_rad" for k in range(1, self.columns + 1 - self.payload))
-        return (*combinations, compliance) if self.payload else combinations
+    names: tuple[str, ...]  # (m,) of the coefficients
+    variant: str = ""
+    corrections: int = 0  # last columns, which mend the first one, in sigmas of the stated masses
+    stated: bool = True  # whether masses are
 
     def believable(self, coefficients: Floats, inner: Floats) -> bool:
-        """Of unknown masses: a payload bends nothing against its weight."""
-        return not self.payload or bool(coefficients[-1] >= 0.0)
+        """Springs give way along their load; where masses are unknown, only the payload's column shows it."""
+        if self.stated:
+            return yields(coefficients, self.corrections)
+        return self.names[-1] != COMPLIANCE or bool(coefficients[-1] >= 0.0)
+
+
+def soft(where: Where, weighed: Weighed, limit: float, sentence: str) -> Form:
+    """The term of a part that yields by these columns at all six coordinates of its port."""
+    return Form(
+        *where,
+        variant=weighed.variant,
+        function=lambda drivers, inner: weighed.at(drivers),
+        names=weighed.names,
+        limit=limit,
+        sentence=sentence,
+        believable=weighed.believable,
+    )
 
 
 def by_stated(by: By) -> Weighed:
@@ -52,7 +68,7 @@ def by_stated(by: By) -> Weighed:
     def at(drivers: Drivers) -> Floats:
         return by(drivers, carried(drivers)).sum(axis=2, keepdims=True)
 
-    return Weighed(lru_cache(maxsize=KEPT)(at), 1)
+    return Weighed(lru_cache(maxsize=KEPT)(at), (COMPLIANCE,))
 
 
 def by_corrected(drivers: Drivers, by: By) -> Weighed | None:
@@ -77,12 +93,13 @@ def by_corrected(drivers: Drivers, by: By) -> Weighed | None:
         moved = by(drivers, off) @ mix - plain * (along @ mix)
         return np.concatenate([plain, moved], axis=2)
 
-    return Weighed(lru_cache(maxsize=KEPT)(at), 1 + kept, kept)
+    names = (COMPLIANCE, *(f"mass_correction{k}_rad_nm" for k in range(1, kept + 1)))
+    return Weighed(lru_cache(maxsize=KEPT)(at), names, "masses corrected", kept)
 
 
 def by_unknown(drivers: Drivers, by: By, first: int) -> Weighed | None:
     """Strongest combinations of masses at the frames from `first` on, each of rms 1; last the payload, where its mass
-    is recorded. None where no mass would show.
+    is recorded: the only column that shows a compliance. None where no mass would show.
     """
     ones = by(drivers, unit_loads(drivers, first))
     flat = ones.reshape(-1, ones.shape[2])
@@ -100,7 +117,9 @@ def by_unknown(drivers: Drivers, by: By, first: int) -> Weighed | None:
         carried_kg = np.zeros(len(drivers.t_s)) if drivers.payload_kg is None else drivers.payload_kg
         return np.concatenate([columns, by(drivers, [payload(drivers, carried_kg)])], axis=2)
 
-    return Weighed(lru_cache(maxsize=KEPT)(at), kept + carries, payload=carries)
+    names = tuple(f"combination{k}_rad" for k in range(1, kept + 1))
+    known = (COMPLIANCE,) if carries else ()
+    return Weighed(lru_cache(maxsize=KEPT)(at), (*names, *known), "unknown masses", stated=False)
 
 
 def yields(coefficients: Floats, corrections: int = 0) -> bool:
