@@ -49,7 +49,7 @@ class DhArm(SerialArm):
         self._T_last_flange = np.eye(4) if T_last_flange is None else T_last_flange
         self._T_base_first = np.eye(4) if T_base_first is None else T_base_first
         self._twist_flange_last = adjoint(inverse(self._T_last_flange))
-        parameters = tuple(p for i, k in enumerate(links, start=1) for p in _link_parameters(i, k, belief))
+        parameters = tuple(p for i, k in enumerate(links, start=1) for p in row_parameters(i, i, k, belief))
         super().__init__(n, parameters, tuple(frame for i in range(n) for frame in (i, i, i + 1, i + 1, i + 1)))
 
     def link_tail(self, theta: Floats) -> Floats:
@@ -93,11 +93,12 @@ def near_parallel(alpha_rad: float) -> bool:
     return abs(math.cos(alpha_rad)) > PARALLEL_COSINE
 
 
-def _link_parameters(i: int, link: DhLink, belief: LinkBelief) -> tuple[Parameter, ...]:
+def row_parameters(i: int, body: int, row: DhLink, belief: LinkBelief) -> tuple[Parameter, ...]:
+    """Of row i, whose length, twist and tilt are those of link `body`."""
     return (
         zero_parameter(i),
         link_length(f"link{i}.offset", belief),
-        link_length(f"link{i}.length", belief),
-        link_angle(f"link{i}.twist", belief),
-        link_angle(f"link{i}.tilt", belief, own=near_parallel(link.alpha_rad)),
+        link_length(f"link{body}.length", belief),
+        link_angle(f"link{body}.twist", belief),
+        link_angle(f"link{body}.tilt", belief, own=near_parallel(row.alpha_rad)),
     )

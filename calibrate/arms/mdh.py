@@ -14,10 +14,9 @@ the axis of joint i-1 and is held, as in arms/dh.py.
 import numpy as np
 from numpy.typing import NDArray
 
-from calibrate.arms.belief import LinkBelief, link_angle, link_length, zero_parameter
-from calibrate.arms.dh import DhLink, near_parallel, nominal_rows
+from calibrate.arms.belief import LinkBelief
+from calibrate.arms.dh import DhLink, nominal_rows, row_parameters
 from calibrate.arms.serial import SerialArm, rotation_x, rotation_y, shift
-from calibrate.parameters import Parameter
 from calibrate.rigid import slide_twist, turn_twist
 
 Floats = NDArray[np.float64]
@@ -38,7 +37,7 @@ class MdhArm(SerialArm):
         self._nominal = nominal_rows(rows)
         self._T_last_flange = np.eye(4) if T_last_flange is None else T_last_flange
         self._T_base_first = np.eye(4) if T_base_first is None else T_base_first
-        parameters = tuple(p for i, row in enumerate(rows, start=1) for p in _row_parameters(i, row, belief))
+        parameters = tuple(p for i, row in enumerate(rows, start=1) for p in row_parameters(i, i - 1, row, belief))
         super().__init__(len(rows), parameters, tuple(np.repeat(np.arange(len(rows)), PER_ROW).tolist()))
 
     def fixed_parts(self, theta: Floats) -> Floats:
@@ -65,13 +64,3 @@ class MdhArm(SerialArm):
     def _rows(self, theta: Floats) -> Floats:
         """(5, joint) theta offset, d, a, alpha, tilt as corrected."""
         return (self._nominal + theta.reshape(-1, PER_ROW)).T
-
-
-def _row_parameters(i: int, row: DhLink, belief: LinkBelief) -> tuple[Parameter, ...]:
-    return (
-        zero_parameter(i),
-        link_length(f"link{i}.offset", belief),
-        link_length(f"link{i - 1}.length", belief),
-        link_angle(f"link{i - 1}.twist", belief),
-        link_angle(f"link{i - 1}.tilt", belief, own=near_parallel(row.alpha_rad)),
-    )
