@@ -11,6 +11,7 @@ from calibrate.diagnose.contests import NextPoses
 from calibrate.diagnose.fitted import Fitted
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.intp]
 Key = tuple[int | None, ...]  # placement, first_psd, seat
 
 LOADED_KG = 1e-3  # a payload of less is none
@@ -26,10 +27,10 @@ def plan_of(found: NextPoses, state: Fitted) -> PosePlan:
     return PosePlan(schema=1, rig=state.session.rig.name, block=tuple(blocks), purpose=_purpose(found))
 
 
-def _block(found: NextPoses, mine: NDArray[np.intp], key: Floats) -> PlannedBlock:
+def _block(found: NextPoses, mine: Ints, key: Floats) -> PlannedBlock:
     placement, first, seat = (None if value < 0 else int(value) for value in key[:3])
     return PlannedBlock(
-        pose=tuple(_pose(found, i) for i in mine[_short_way(found.poses.q_rad[mine])]),
+        pose=tuple(_pose(found, i) for i in mine[short_way(found.poses.q_rad[mine])]),
         placement=placement,
         first_psd=1 if first == 1 else 2 if first == 2 else None,
         seat=seat,
@@ -51,13 +52,13 @@ def _four(values: Sequence[float]) -> tuple[float, float, float, float]:
     return a, b, c, d
 
 
-def _short_way(q_rad: Floats) -> list[int]:
-    """From each pose to the nearest that is left, by the joint that turns most."""
+def short_way(q_rad: Floats) -> Ints:
+    """(pose,) order: from each of the poses (pose, joint) to the nearest that is left, by the joint that turns most."""
     left, order = list(range(1, len(q_rad))), [0]
     while left:
         away = np.max(np.abs(q_rad[left] - q_rad[order[-1]]), axis=1)
         order.append(left.pop(int(np.argmin(away))))
-    return order
+    return np.array(order, dtype=np.intp)
 
 
 def _purpose(found: NextPoses) -> tuple[str, ...]:

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from acquisition.recording.pose_plan import PosePlan
 from acquisition.recording.rig import Rig
 from calibrate.diagnose.diagnosis import Named
+from calibrate.diagnose.plan_of import short_way
 from calibrate.errors import DataError
 from calibrate.pose_design.candidates import Candidates, Taken, blocks_of, plan_of, taken
 from calibrate.pose_design.exchange import CRITERIA, Choice, choose, one_by_one
@@ -50,7 +51,7 @@ def ordered(found: Information, candidates: Candidates, blocks: list[Ints], rng:
     """Candidates of each block; blocks stay in their order, and poses change places within blocks of one kind."""
     q_rad, place = candidates.q_rad, candidates.placement
     kind = 2 * place + candidates.first_psd
-    begun = [block[_short_way(q_rad[block])] for block in blocks]
+    begun = [block[short_way(q_rad[block])] for block in blocks]
     poses = np.concatenate(begun)
     of_block = kind[poses]
     drift, hat = _drifts(found, poses, place[poses])
@@ -108,15 +109,6 @@ def _absorbed(drift: _Drifts, hat: Floats, at: Ints) -> float:
 
 def _move(q_rad: Floats) -> float:
     return float(np.mean(np.max(np.abs(np.diff(q_rad, axis=0)), axis=1))) if len(q_rad) > 1 else 0.0
-
-
-def _short_way(q_rad: Floats) -> Ints:
-    """From each pose to the nearest that is left, by the joint that turns most."""
-    left, order = list(range(1, len(q_rad))), [0]
-    while left:
-        away = np.max(np.abs(q_rad[left] - q_rad[order[-1]]), axis=1)
-        order.append(left.pop(int(np.argmin(away))))
-    return np.array(order, dtype=np.intp)
 
 
 Progress = Callable[[str, int, int], None]
