@@ -2,9 +2,10 @@
 
 from msgspec.structs import replace
 
-from acquisition.recording.rig import ArmModel, Pose, Rig
+from acquisition.recording.rig import ArmModel, Pose, Rig, parse_rig
 from calibrate.arms.convert import Conversion, convert, pose_of
 from calibrate.errors import DataError
+from calibrate.model_file import ModelFile
 from calibrate.rigid import inverse, transform
 
 EXACT_M = 1e-9  # rounding of a chain of metres is far below
@@ -22,6 +23,14 @@ def rig_in_model(rig: Rig, model: ArmModel) -> Rig:
     placements = tuple(replace(p, psd1_in_base=_in_new_base(p.psd1_in_base, made)) for p in rig.placement_list)
     device = None if rig.device is None else _in_new_base(rig.device, made)
     return replace(rig, arm=made.arm, placement_list=placements, device=device)
+
+
+def rig_of_model(model: ModelFile) -> Rig:
+    """The rig of a model file, in the arm model of its parameters. DataError for a file without its rig."""
+    if model.rig.text is None:
+        raise DataError(f"model of rig {model.rig.name}: the rig's text is not in the file; identify again")
+    rig = parse_rig(model.rig.text, f"rig.toml in the model of {model.rig.name}")
+    return rig_in_model(rig, ArmModel(model.arm_model))
 
 
 def _in_new_base(pose: Pose, made: Conversion) -> Pose:

@@ -9,13 +9,12 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from acquisition.recording import Samples
-from acquisition.recording.rig import ArmModel, Rig, parse_rig
+from acquisition.recording.rig import Rig
 from calibrate.arms.catalogue import arm_of
 from calibrate.arms.eccentric import EccentricArm, with_discs
 from calibrate.arms.model import KinematicModel
-from calibrate.converted_rig import rig_in_model
+from calibrate.converted_rig import rig_of_model
 from calibrate.dual_psd_rig import dual_psd_of
-from calibrate.errors import DataError
 from calibrate.model_file import ModelFile
 from calibrate.parameters import Parameter, values_by_name
 from calibrate.sensors.catalogue import SENSORS
@@ -42,11 +41,7 @@ class Predictor:
     @classmethod
     def of(cls, model: ModelFile) -> "Predictor":
         """DataError for a model file without its rig."""
-        if model.rig.text is None:
-            raise DataError(f"model of rig {model.rig.name}: the rig's text is not in the file; identify again")
-        rig = parse_rig(model.rig.text, f"rig.toml in the model of {model.rig.name}")
-        rig = rig_in_model(rig, ArmModel(model.arm_model))
-        return cls(rig, model.chain, model.about, model.instruments)
+        return cls(rig_of_model(model), model.chain, model.about, model.instruments)
 
     def flange(self, q_rad: Floats) -> Floats:
         """T_base_flange (pose, 4, 4)."""

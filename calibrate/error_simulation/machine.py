@@ -18,12 +18,11 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
-from acquisition.recording.rig import ArmModel, Rig, parse_rig
+from acquisition.recording.rig import Rig
 from calibrate.arms.compiled import PER_PART, perturbed_points
 from calibrate.arms.rig_arm import RigArm
-from calibrate.converted_rig import rig_in_model
+from calibrate.converted_rig import rig_of_model
 from calibrate.error_simulation.sources import Law, Source
-from calibrate.errors import DataError
 from calibrate.model_file import ModelFile
 from calibrate.rigid import cross
 
@@ -73,10 +72,7 @@ def machine_of(
 
 def identified_machine(model: ModelFile) -> tuple[Machine, Rig]:
     """The arm of a model file as identified, and its rig. DataError for a file without its rig."""
-    if model.rig.text is None:
-        raise DataError(f"model of rig {model.rig.name}: the rig's text is not in the file; identify again")
-    rig = parse_rig(model.rig.text, f"rig.toml in the model of {model.rig.name}")
-    rig = rig_in_model(rig, ArmModel(model.arm_model))
+    rig = rig_of_model(model)
     return machine_of(rig, model.chain, model.about.get("tool")), rig
 
 
