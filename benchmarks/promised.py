@@ -16,11 +16,11 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from acquisition.recording.rig import parse_rig
 from calibeam.cli import run
 from calibeam.motion.motion_inverse import MotionInverse
+from calibrate.alignment import rigid_motion
 from calibrate.arms.rig_arm import RigArm
 from calibrate.correct.corrected import Corrected, Options, Wanted, as_samples, correct
 from calibrate.model_file import ModelFile, read_model
@@ -114,17 +114,12 @@ def _judged(case: Case, model: ModelFile, found: Corrected, asked: Wanted, tool:
 
 
 def _motion(case: Case, model: ModelFile, q_rad: Floats) -> Floats:
-    """(4, 4) that brings the measured point of the concealed arm best onto that of the model (Kabsch)."""
+    """(4, 4) that brings the measured point of the concealed arm best onto that of the model."""
     known = placed(model, as_samples(q_rad, {"payload_kg": np.zeros(len(q_rad))}))
     there_m = Predictor.of(model).measured_at(known.T_base_flange)
     points_m = np.atleast_2d(case.drawn.true.tool_point_m)  # of each row, where targets are several
     first = np.argmin(np.linalg.norm(points_m - np.array(case.drawn.believed.tool_point_m), axis=1))
-    truly_m = true_tips_m(case, q_rad, points_m[first])
-    a, b = truly_m - truly_m.mean(axis=0), there_m - there_m.mean(axis=0)
-    out = np.eye(4)
-    out[:3, :3] = Rotation.align_vectors(b, a)[0].as_matrix()
-    out[:3, 3] = there_m.mean(axis=0) - out[:3, :3] @ truly_m.mean(axis=0)
-    return out
+    return rigid_motion(there_m, true_tips_m(case, q_rad, points_m[first]))
 
 
 def true_tips_m(case: Case, q_rad: Floats, point_m: Floats) -> Floats:

@@ -1,15 +1,14 @@
-"""Start values in closed form: frames by Kabsch's rotation, a tool point by linear equations, a drum by trilateration.
+"""Rigid alignment of points, and start values in closed form: a frame, a tool point, a drum.
 
-No iteration from a guess: any place of the device is found. Sources: Kabsch, Acta Cryst. A32, 1976; Horn, J. Opt. Soc.
-Am. A 4(4), 1987 (scipy's Rotation.align_vectors); trilateration by differences of squared lengths is linear algebra.
+`rigid_motion` is the one place where points are brought onto points. No iteration from a guess: any place of the device
+is found. Sources: Arun, Huang, Blostein, IEEE PAMI 9(5), 1987 (singular values); Umeyama, IEEE PAMI 13(4), 1991 (sign
+of the determinant); trilateration by differences of squared lengths is linear algebra.
 """
 
-import warnings
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from calibrate.errors import DataError
 
@@ -21,6 +20,55 @@ ROUNDS = 10  # of leaving out shots far off; two or three are enough where most 
 FAR = 5.0  # medians of the residual: one good shot of 1e4 lies farther off (Maxwell law), so few good ones are lost
 CLEARLY = 0.5  # of the other rms: a flat set of points with noise prefers one hand by a hair only
 GROSS = 0.05  # of the usual distance from the middle: more than an arm beside its drawing explains
+
+
+def rigid_motion(
+    points_a_m: Floats, points_b_m: Floats, weight: Floats | None = None, *, mirrored: bool = False
+) -> Floats:
+    """(..., 4, 4) T_a_b that brings points b onto the same points in a with the least weighted sum of squares.
+
+    Points (..., point, 3) in m, weights (..., point) or None for equal ones; sets before the last axes are broadcast
+    and solved side by side. The linear part is a rotation; if `mirrored`, a reflection (determinant -1).
+    Raises nothing: for fewer than 3 points, or points on a line, the turn about the line is open and one of the best
+    motions is returned; the distances that remain are the same for all of them. `align` raises DataError there.
+    """
+    middle_a, middle_b = weighted_mean(points_a_m, weight), weighted_mean(points_b_m, weight)
+    linear = best_rotation(
+        points_a_m - middle_a[..., None, :], points_b_m - middle_b[..., None, :], weight, mirrored=mirrored
+    )
+    T_a_b = np.zeros((*linear.shape[:-2], 4, 4))
+    T_a_b[..., :3, :3] = linear
+    T_a_b[..., :3, 3] = middle_a - (linear @ middle_b[..., None])[..., 0]
+    T_a_b[..., 3, 3] = 1.0
+    return T_a_b
+
+
+def aligned_difference(points_a_m: Floats, points_b_m: Floats) -> Floats:
+    """(point, 3) what remains after the best rigid motion: b as moved onto a, less a. Both (point, 3), in m."""
+    return _difference(rigid_motion(points_a_m, points_b_m), points_a_m, points_b_m)
+
+
+def best_rotation(
+    vectors_a: Floats, vectors_b: Floats, weight: Floats | None = None, *, mirrored: bool = False
+) -> Floats:
+    """(..., 3, 3) R_a_b that brings directions, or centred points, b best onto a, both (..., vector, 3): no shift."""
+    weighed = vectors_a if weight is None else vectors_a * weight[..., None]
+    return nearest_rotation(np.swapaxes(weighed, -1, -2) @ vectors_b, mirrored=mirrored)
+
+
+def nearest_rotation(matrix: Floats, *, mirrored: bool = False) -> Floats:
+    """(..., 3, 3) the rotation, or the reflection if `mirrored`, nearest to matrices (..., 3, 3)."""
+    U, _, Vt = np.linalg.svd(matrix)
+    U[..., 2] *= (np.sign(np.linalg.det(U @ Vt)) * (-1.0 if mirrored else 1.0))[..., None]
+    return np.asarray(U @ Vt, dtype=np.float64)
+
+
+def weighted_mean(points_m: Floats, weight: Floats | None) -> Floats:
+    """(..., 3) of points (..., point, 3) by weights (..., point); None: equal ones."""
+    if weight is None:
+        return np.asarray(points_m.mean(axis=-2), dtype=np.float64)
+    share = weight / weight.sum(axis=-1, keepdims=True)
+    return np.asarray((share[..., None, :] @ points_m)[..., 0, :], dtype=np.float64)
 
 
 @dataclass(frozen=True)
@@ -51,8 +99,8 @@ def align(points_a_m: Floats, points_b_m: Floats) -> Alignment:
     """
     used = np.ones(len(points_a_m), dtype=bool)
     for _ in range(ROUNDS):
-        T_a_b = _kabsch(points_a_m[used], points_b_m[used])
-        off_m = np.linalg.norm(points_b_m @ T_a_b[:3, :3].T + T_a_b[:3, 3] - points_a_m, axis=1)
+        T_a_b = _determined_motion(points_a_m[used], points_b_m[used])
+        off_m = np.linalg.norm(_difference(T_a_b, points_a_m, points_b_m), axis=1)
         near = off_m <= FAR * np.median(off_m) + np.finfo(float).eps * np.abs(points_a_m).max()
         if np.array_equal(near, used):
             break
@@ -74,8 +122,7 @@ def align_with_tool(T_base_flange: Floats, points_device_m: Floats) -> tuple[Ali
     affine = np.einsum("ij,nk->nijk", np.eye(3), points_device_m).reshape(n, 3, 9)
     rows = np.concatenate([-R, affine, unit], axis=2).reshape(-1, 15)
     found = np.linalg.lstsq(rows, p.ravel(), rcond=1e-9)[0]
-    U, _, Vt = np.linalg.svd(found[3:12].reshape(3, 3))
-    turn = U @ np.diag([1.0, 1.0, np.linalg.det(U @ Vt)]) @ Vt
+    turn = nearest_rotation(np.asarray(found[3:12].reshape(3, 3), dtype=np.float64))
     rows = np.concatenate([-R, unit], axis=2).reshape(-1, 6)
     both = np.linalg.lstsq(rows, (p - points_device_m @ turn.T).ravel(), rcond=1e-9)[0]
     tool_m = np.asarray(both[:3], dtype=np.float64)
@@ -114,29 +161,26 @@ def trilaterate(points_m: Floats, lengths_m: Floats) -> Floats:
     return np.asarray(origin + points_m.mean(axis=0), dtype=np.float64)
 
 
-def _kabsch(a: Floats, b: Floats) -> Floats:
+def _determined_motion(a: Floats, b: Floats) -> Floats:
+    """As `rigid_motion`; DataError for fewer than 3 points or points on a line."""
     centred = b - b.mean(axis=0) if len(b) else b
     extent = np.linalg.svd(centred, compute_uv=False) if len(b) >= 3 else np.zeros(3)
     if len(b) < 3 or extent[1] < FLAT * max(extent[0], 1e-300):
         raise DataError(f"device frame: {len(b)} positions on one line or fewer than 3; measure all over the workspace")
-    T = np.eye(4)
-    with warnings.catch_warnings():  # of a turn that the points leave open: the rank of the fit names it
-        warnings.simplefilter("ignore", UserWarning)
-        T[:3, :3] = Rotation.align_vectors(a - a.mean(axis=0), centred)[0].as_matrix()
-    T[:3, 3] = a.mean(axis=0) - T[:3, :3] @ b.mean(axis=0)
-    return T
+    return rigid_motion(a, b)
 
 
 def _judged(a: Floats, b: Floats, used: Bools) -> Alignment:
-    T_a_b = _kabsch(a, b)
-    mirror = np.diag([1.0, 1.0, -1.0])
-    T_mirrored = _kabsch(a, b @ mirror)
+    T_a_b, T_mirrored = _determined_motion(a, b), rigid_motion(a, b, mirrored=True)
     U, s, Vt = np.linalg.svd((a - a.mean(axis=0)).T @ (b - b.mean(axis=0)))
     determinant = float(np.sign(np.linalg.det(U @ Vt))) if s[2] > FLAT**2 * s[0] else 0.0
     spread_m = float(np.median(np.linalg.norm(b - b.mean(axis=0), axis=1)))
-    return Alignment(T_a_b, _rms(T_a_b, a, b), _rms(T_mirrored, a, b @ mirror), determinant, used, spread_m)
+    return Alignment(T_a_b, _rms(T_a_b, a, b), _rms(T_mirrored, a, b), determinant, used, spread_m)
 
 
 def _rms(T_a_b: Floats, a: Floats, b: Floats) -> float:
-    off = b @ T_a_b[:3, :3].T + T_a_b[:3, 3] - a
-    return float(np.sqrt(np.mean(np.sum(off**2, axis=1))))
+    return float(np.sqrt(np.mean(np.sum(_difference(T_a_b, a, b) ** 2, axis=1))))
+
+
+def _difference(T_a_b: Floats, a: Floats, b: Floats) -> Floats:
+    return np.asarray(b @ T_a_b[:3, :3].T + T_a_b[:3, 3] - a, dtype=np.float64)

@@ -82,6 +82,16 @@ def test_arms_are_turned_by_one_forward_kinematics() -> None:
     assert {path for path in users if not path.startswith(tuple(TURNED_PARTS))} == set()
 
 
+def test_points_are_brought_onto_points_in_one_place() -> None:
+    """Acquisition, which may not import calibrate, turns directions by itself."""
+    found = {
+        path
+        for path, text in texts().items()
+        if "align_vectors" in text or ("linalg.svd" in text and "linalg.det" in text)
+    }
+    assert {path for path in found if not path.startswith("acquisition")} == {"calibrate/alignment.py"}
+
+
 def test_ways_to_leave_rows_out_and_chain_rules_are_stated_once() -> None:
     for name in ("Split", "by_place", "last_block", "chain_frames", "unfolded_faces", "by_beam", "Conditions"):
         defined = [

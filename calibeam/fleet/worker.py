@@ -16,7 +16,6 @@ from typing import Any
 
 import msgspec
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from acquisition.recording import Recording, RecordingError, read
 from acquisition.recording.rig import Rig
@@ -24,6 +23,7 @@ from calibeam.fleet.recordings import content_sha256
 from calibeam.fleet.row import Cause, Outcome, Row, Task, Zero
 from calibeam.results.diagnosis import diagnose_recording
 from calibeam.results.identification import JudgedModel, identify_and_judge
+from calibrate.alignment import aligned_difference
 from calibrate.arms.catalogue import arm_of
 from calibrate.arms.eccentric import with_discs
 from calibrate.diagnose.schema import DiagnosisFile
@@ -139,7 +139,7 @@ def drawn_against_identified(model: ModelFile) -> float | None:
     """Rms distance (m) over poses drawn evenly between the joint limits, three axes together, base frames laid over.
 
     The target is the identified one on both arms. None where the model predicts no error over the workspace: then it is
-    unknown what the target does. Source of the best turn: Kabsch, Acta Cryst. A32, 1976.
+    unknown what the target does.
     """
     room = model.free_space
     if room is None or room.rms_m is None:
@@ -151,9 +151,7 @@ def drawn_against_identified(model: ModelFile) -> float | None:
     point = np.append(room.point_m, 1.0)
     drawn = (arm.flange(values_by_name(arm.parameters, {}), q_rad) @ point)[:, :3]
     identified = (known.flange(q_rad) @ point)[:, :3]
-    a, b = (points - points.mean(axis=0) for points in (identified, drawn))
-    turn = Rotation.align_vectors(a, b)[0]
-    return float(np.sqrt(np.mean(np.sum((turn.apply(b) - a) ** 2, axis=1))))
+    return float(np.sqrt(np.mean(np.sum(aligned_difference(identified, drawn) ** 2, axis=1))))
 
 
 IDLE_S = 120.0  # a Dask cluster stays up after a run: nothing of ours shall

@@ -32,6 +32,7 @@ from calibeam.prove.record import UNKNOWN, CaseScore, DefectScore, FreeSpace, Na
 from calibeam.prove.scenario import Scenario
 from calibeam.prove.seal import Layout
 from calibeam.prove.unseen import LaserBeam, Tool, read_unseen
+from calibrate.alignment import aligned_difference
 from calibrate.diagnose.file import read_diagnosis
 from calibrate.diagnose.scatter import sigma_about_zero
 from calibrate.diagnose.schema import DiagnosisFile, FindingRecord, NameRecord
@@ -124,14 +125,7 @@ def errors_m(said: Tool | None, truth: FreeSpace) -> float | None:
         return _beams_m(said, np.array(truth.beam_origin_m), np.array(truth.beam_direction))
     if said is None or truth.tip_m is None:
         return None
-    return _rms(_tips_m(said, np.array(truth.tip_m)))
-
-
-def _tips_m(said: Floats, true: Floats) -> Floats:
-    """(pose, 3) after the best rigid motion. Source: Kabsch, Acta Cryst. A32, 1976."""
-    a, b = said - said.mean(axis=0), true - true.mean(axis=0)
-    turn = Rotation.align_vectors(b, a)[0]
-    return turn.apply(a) - b
+    return _rms(aligned_difference(np.array(truth.tip_m), said))
 
 
 def _beams_m(said: LaserBeam, origin_m: Floats, direction: Floats) -> float:

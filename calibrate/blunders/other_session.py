@@ -5,8 +5,9 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from acquisition.recording.samples import POSITION
+from calibrate.alignment import rigid_motion
 from calibrate.blunders.finding import Blunder, BlunderKind, runs_of
-from calibrate.blunders.rough_fit import frame_between, rough_fit
+from calibrate.blunders.rough_fit import rough_fit
 from calibrate.blunders.same_posture import err_alike, postures
 from calibrate.blunders.shots import Shots, outlying, robust_scale
 
@@ -78,7 +79,8 @@ def _block(shots: Shots, first: int, last: int, misfit: Floats, scale: float) ->
         return None
     observed = shots.observed[inside]
     expected = observed + misfit[inside] * shots.sigma
-    linear, shift_m = frame_between(expected, observed, np.ones(len(observed)))
+    T_observed_expected = rigid_motion(observed, expected)
+    linear, shift_m = T_observed_expected[:3, :3], T_observed_expected[:3, 3]
     left = np.linalg.norm((expected @ linear.T + shift_m - observed) / shots.sigma, axis=1)
     before = float(np.median(np.linalg.norm(misfit[inside], axis=1)))
     if float(np.median(left)) > max(REMAINS * before, USUAL * scale) or float(np.median(left)) > 0.5 * before:

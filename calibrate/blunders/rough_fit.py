@@ -1,9 +1,8 @@
 """How well a nominal arm explains measured positions, whatever frame and target: fast, robust, mirrors allowed.
 
-Frame by the weighted Procrustes solution (Umeyama, IEEE PAMI 13(4), 1991, with the sign of the determinant given
-instead of chosen); target as the weighted mean of the measured points in the flange frame; both in turn. Weights are
-those of the least sum of distances (Weiszfeld), so that a few outlying rows do not pull. Of several targets each is a
-point of its own.
+Frame by weighted rigid alignment, with a mirror where asked; target as the weighted mean of the measured points in the
+flange frame; both in turn. Weights are those of the least sum of distances (Weiszfeld), so that a few outlying rows do
+not pull. Of several targets each is a point of its own.
 """
 
 from dataclasses import dataclass, replace
@@ -11,6 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from calibrate.alignment import rigid_motion, weighted_mean
 from calibrate.blunders.least_distance import median, weights
 
 Floats = NDArray[np.float64]
@@ -47,36 +47,12 @@ def rough_fit_of_targets(
     linear, shift = np.eye(3), np.zeros(3)
     tip = (R @ point_m[target, :, None])[..., 0] + t
     for _ in range(TURNS):
-        linear, shift = frame_between(tip, position_m, weight, mirrored=mirrored)
+        T_device_base = rigid_motion(position_m, tip, weight, mirrored=mirrored)
+        linear, shift = T_device_base[..., :3, :3], T_device_base[..., :3, 3]
         in_base = (position_m - shift[..., None, :]) @ linear
         in_flange = ((in_base - t)[..., None, :] @ R)[..., 0, :]
-        point_m = averaged(in_flange[..., None, :, :], np.where(of, weight[..., None, :], 0.0))
+        point_m = weighted_mean(in_flange[..., None, :, :], np.where(of, weight[..., None, :], 0.0))
         tip = (R @ point_m[..., target, :, None])[..., 0] + t
         distance = np.linalg.norm(tip - in_base, axis=-1)
         weight = weights(distance)
     return RoughFit(linear, shift, point_m, distance, median(distance))
-
-
-def averaged(points_m: Floats, weight: Floats) -> Floats:
-    """(..., 3) of points (..., point, 3) by weights (..., point)."""
-    share = weight / weight.sum(axis=-1, keepdims=True)
-    return np.asarray((share[..., None, :] @ points_m)[..., 0, :])
-
-
-def frame_between(a_m: Floats, b_m: Floats, weight: Floats, *, mirrored: bool = False) -> tuple[Floats, Floats]:
-    """(linear (..., 3, 3), shift (..., 3)) with linear @ a + shift nearest to b, both (..., point, 3), by weights."""
-    middle_a, middle_b = averaged(a_m, weight), averaged(b_m, weight)
-    linear = turn_between(a_m - middle_a[..., None, :], b_m - middle_b[..., None, :], weight, mirrored=mirrored)
-    return linear, middle_b - (linear @ middle_a[..., None])[..., 0]
-
-
-def turn_between(a: Floats, b: Floats, weight: Floats, *, mirrored: bool = False) -> Floats:
-    """(..., 3, 3) linear with linear @ a nearest to b, both (..., vector, 3), weights (..., vector)."""
-    return nearest_turn(np.swapaxes(b * weight[..., None], -1, -2) @ a, mirrored=mirrored)
-
-
-def nearest_turn(matrix: Floats, *, mirrored: bool = False) -> Floats:
-    """The rotation, or reflection, (..., 3, 3) nearest to matrices (..., 3, 3)."""
-    U, _, Vt = np.linalg.svd(matrix)
-    U[..., 2] *= (np.sign(np.linalg.det(U @ Vt)) * (-1.0 if mirrored else 1.0))[..., None]
-    return np.asarray(U @ Vt, dtype=np.float64)

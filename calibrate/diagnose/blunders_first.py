@@ -13,11 +13,12 @@ from scipy.spatial.transform import Rotation
 from acquisition.recording import Samples
 from acquisition.recording.rig import Rig
 from acquisition.recording.samples import POSITION, SEAT
+from calibrate.alignment import rigid_motion
 from calibrate.arms.catalogue import arm_of
 from calibrate.blunders.bad_rows import bad_rows
 from calibrate.blunders.finding import Blunder, BlunderKind
 from calibrate.blunders.other_session import sessions_apart
-from calibrate.blunders.rough_fit import frame_between, rough_fit
+from calibrate.blunders.rough_fit import rough_fit
 from calibrate.blunders.same_posture import err_alike, postures
 from calibrate.blunders.shots import Shots
 from calibrate.blunders.witness import by_target
@@ -113,7 +114,8 @@ def _joined_among(flange: Floats, positions: Floats, point: Floats | None, rows:
 
 
 def _elsewhere(expected: Floats, observed: Floats, block: NDArray[np.bool_]) -> bool:
-    linear, shift_m = frame_between(expected[block], observed[block], np.ones(int(block.sum())))
+    T_observed_expected = rigid_motion(observed[block], expected[block])
+    linear, shift_m = T_observed_expected[:3, :3], T_observed_expected[:3, 3]
     middle = expected[block].mean(axis=0)
     moved_m = float(np.linalg.norm(linear @ middle + shift_m - middle))
     return max(moved_m, float(Rotation.from_matrix(linear).magnitude())) > LIMIT

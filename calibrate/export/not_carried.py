@@ -10,9 +10,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from acquisition.recording import Samples
+from calibrate.alignment import aligned_difference
 from calibrate.effects.ports import Perturbation
 from calibrate.errors import DataError
 from calibrate.model_file import ModelFile
@@ -125,7 +125,8 @@ def geometry_lost(model: ModelFile) -> str:
     kept = {n: v for n, v in predictor.values.items() if n.endswith(".zero") or not n.startswith(("joint", "link"))}
     none = {n: v for n, v in kept.items() if not n.startswith("joint")}
     off, drawn = (
-        Moved.of(_left_over(replace(predictor, values=values).tip_m(q), predictor.tip_m(q))) for values in (kept, none)
+        Moved.of(aligned_difference(predictor.tip_m(q), replace(predictor, values=values).tip_m(q)))
+        for values in (kept, none)
     )
     return (
         f"not carried: lengths and axes; with the offsets alone the tip differs from this model by {_length(off)}; "
@@ -149,12 +150,6 @@ def left_by_zeros(model: ModelFile) -> tuple[str, ...]:
             f"remaining error with these offsets alone{of}, {where}: {says(after)} rms; nominal arm {says(before)}"
         )
     return (*out, *(f"unseen rows: no proof ({why})" for why in model.unproven))
-
-
-def _left_over(tip_m: Floats, wanted_m: Floats) -> Floats:
-    """(pose, 3) after the motion that brings the one best onto the other."""
-    a, b = tip_m - tip_m.mean(axis=0), wanted_m - wanted_m.mean(axis=0)
-    return np.asarray(Rotation.align_vectors(b, a)[0].apply(a) - b, dtype=np.float64)
 
 
 def _drawn(recorded: Samples) -> Samples:

@@ -17,6 +17,7 @@ from acquisition.recording import Samples
 from acquisition.recording.pose_plan import PosePlan
 from acquisition.recording.rig import Rig
 from acquisition.recording.samples import ORIENTATION, POSITION
+from calibrate.alignment import rigid_motion
 from calibrate.arms.rig_arm import RigArm
 from calibrate.correct.corrected import Arms, Options
 from calibrate.effects.drivers import moves_of
@@ -234,11 +235,7 @@ def _fitted(there_m: Floats, seen_m: Floats) -> Floats:
             "--frame fit: fewer than three poses, or all on a line, do not determine the pose of the device; "
             "take more poses, or give --frame rig or a --model of the same set-up"
         )
-    T = np.eye(4)
-    centre_m, middle_m = there_m.mean(axis=0), seen_m.mean(axis=0)
-    T[:3, :3] = Rotation.align_vectors(there_m - centre_m, seen_m - middle_m)[0].as_matrix()
-    T[:3, 3] = centre_m - T[:3, :3] @ middle_m
-    return T
+    return rigid_motion(there_m, seen_m)
 
 
 def _turned(part: Samples) -> Floats | None:

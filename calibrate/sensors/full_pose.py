@@ -16,9 +16,9 @@ from scipy.spatial.transform import Rotation
 from acquisition.recording import Samples
 from acquisition.recording.rig import Rig
 from acquisition.recording.samples import ORIENTATION, POSITION
+from calibrate.alignment import best_rotation, nearest_rotation
 from calibrate.blunders.finding import BlunderKind
 from calibrate.blunders.least_distance import median, weights
-from calibrate.blunders.rough_fit import nearest_turn, turn_between
 from calibrate.blunders.witness import Otherwise, Strain, Witness, filled, stacked, thinned
 from calibrate.chain import Chain
 from calibrate.parameters import Parameter
@@ -138,14 +138,13 @@ class OrientationWitness:
     def strain(self, T_base_flange: Floats) -> Strain:
         """A and X as mean rotations in turn, from the start that the turns between poses give."""
         flange, seen = T_base_flange[..., :3, :3], Rotation.from_rotvec(self.rotation_rad).as_matrix()
-        cases = flange.shape[:-3]
-        device = turn_between(_steps(flange), _steps(seen), np.ones((*cases, len(seen) - 1)))  # their axes differ by A
+        device = best_rotation(_steps(seen), _steps(flange))  # their axes differ by A
         weight, angle = np.ones(flange.shape[:-2]), np.zeros(flange.shape[:-2])
         for _ in range(ROUNDS):
             turned = device[..., None, :, :] @ flange
-            mount = nearest_turn(_products(turned, weight[..., None, None] * seen))
+            mount = nearest_rotation(_products(turned, weight[..., None, None] * seen))
             carried = flange @ mount[..., None, :, :]
-            device = nearest_turn(_products(_transposed(weight[..., None, None] * seen), _transposed(carried)))
+            device = nearest_rotation(_products(_transposed(weight[..., None, None] * seen), _transposed(carried)))
             apart = np.linalg.norm(device[..., None, :, :] @ carried - seen, axis=(-2, -1))
             angle = 2.0 * np.arcsin(np.minimum(apart / np.sqrt(8.0), 1.0))
             weight = weights(angle)

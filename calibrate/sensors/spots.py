@@ -2,8 +2,8 @@
 
 Its gross-error check: two spots are one line of light in the fixture, and the laser's line has to lie on it. The first
 spot is a point of the line, and the second, mirrored at the first face, gives its direction: no reflection has to be
-computed for an arm that points elsewhere. Rotation of a fixture by Kabsch over directions, its shift by least squares
-over distances point to line.
+computed for an arm that points elsewhere. The rotation of the fixture is the one that brings directions best onto
+directions; its shift is by least squares over distances from point to line.
 """
 
 from collections.abc import Iterator, Mapping
@@ -16,9 +16,9 @@ from scipy.spatial.transform import Rotation
 from acquisition.recording import Samples
 from acquisition.recording.rig import Rig
 from acquisition.recording.samples import SPOTS
+from calibrate.alignment import best_rotation
 from calibrate.blunders.finding import BlunderKind
 from calibrate.blunders.least_distance import median, weights
-from calibrate.blunders.rough_fit import turn_between
 from calibrate.blunders.witness import Otherwise, Strain, Witness, filled, stacked, thinned
 from calibrate.chain import Chain
 from calibrate.default_belief import pair_of
@@ -112,7 +112,7 @@ def _placed(near: Floats, far: Floats, origin: Floats, beam: Floats, believed: F
     points, own = np.stack([near, far]), believed[:3, 3]
     origins, beams = origin[..., None, :, :], beam[..., None, :, :]
     for _ in range(TURNS):
-        turn = turn_between(along, beam, weight)
+        turn = best_rotation(beam, along, weight)
         gap = _across(origins - points @ np.swapaxes(turn, -1, -2)[..., None, :, :], beams)
         weighed = np.swapaxes(weight[..., None] * beam, -1, -2)
         normal = 2.0 * (weight.sum(axis=-1)[..., None, None] * np.eye(3) - weighed @ beam)

@@ -22,6 +22,7 @@ from acquisition.recording.rig import parse_rig
 from acquisition.recording.session_folder import write_csv
 from calibeam.cli import run
 from calibeam.simulation.mechanism_by_hand import by_hand
+from calibrate.alignment import aligned_difference
 from calibrate.arms.rig_arm import RigArm
 from drivers.ur.control import UrControl
 from simulators.world.world import World
@@ -171,9 +172,7 @@ def wires(tmp_path):
 
 def rms_error_m(reached_m, wanted_m):
     """Of distances, after the motion that brings the one best onto the other: the base is nobody's to know."""
-    a, b = reached_m - reached_m.mean(axis=0), wanted_m - wanted_m.mean(axis=0)
-    turn, _ = Rotation.align_vectors(b, a)
-    return float(np.sqrt(np.mean(np.sum((turn.apply(a) - b) ** 2, axis=1))))
+    return float(np.sqrt(np.mean(np.sum(aligned_difference(wanted_m, reached_m) ** 2, axis=1))))
 
 
 @pytest.mark.timeout(600)

@@ -1,4 +1,4 @@
-"""Closed-form starts: exact on exact data, wherever the device stands, and loud where the data cannot tell."""
+"""Alignment and closed-form starts: exact on exact data, wherever the device stands; a DataError where undetermined."""
 
 from pathlib import Path
 
@@ -9,7 +9,16 @@ from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
 from acquisition.recording.session_folder import read_folder
-from calibrate.alignment import align, align_with_tool, pivot, trilaterate
+from calibrate.alignment import (
+    align,
+    align_with_tool,
+    aligned_difference,
+    best_rotation,
+    nearest_rotation,
+    pivot,
+    rigid_motion,
+    trilaterate,
+)
 from calibrate.errors import DataError
 from calibrate.instruments import instruments_of
 from calibrate.rigid import transform
@@ -29,6 +38,57 @@ def flanges(n, seed=0):
 @pytest.fixture
 def points():
     return np.random.default_rng(1).uniform(-0.5, 0.5, (40, 3))
+
+
+def noisy(points, seed=2):
+    return seen_from_b(points) + np.random.default_rng(seed).normal(0.0, 0.01, points.shape)
+
+
+def test_the_rigid_motion_is_the_one_of_an_independent_implementation(points):
+    seen, weight = noisy(points), np.random.default_rng(3).uniform(0.1, 2.0, len(points))
+    for given in (None, weight):
+        middle_a, middle_b = np.average(points, 0, given), np.average(seen, 0, given)
+        turn = Rotation.align_vectors(points - middle_a, seen - middle_b, given)[0]
+        found = rigid_motion(points, seen, given)
+        assert_allclose(found[:3, :3], turn.as_matrix(), atol=1e-14)
+        assert_allclose(found[:3, 3], middle_a - turn.apply(middle_b), atol=1e-14)
+        assert_allclose(found[3], [0.0, 0.0, 0.0, 1.0])
+    assert_allclose(rigid_motion(points, seen, np.full(len(points), 7.0)), rigid_motion(points, seen), atol=1e-14)
+
+
+def test_a_row_of_weight_zero_does_not_pull(points):
+    seen, weight = seen_from_b(points), np.ones(len(points))
+    seen[5] += 30.0
+    weight[5] = 0.0
+    assert_allclose(rigid_motion(points, seen, weight), T_A_B, atol=1e-12)
+
+
+def test_points_of_the_other_hand_give_a_rotation_unless_a_mirror_is_asked_for(points):
+    seen = seen_from_b(points) * [1.0, -1.0, 1.0]
+    plain, mirrored = rigid_motion(points, seen), rigid_motion(points, seen, mirrored=True)
+    assert np.linalg.det(plain[:3, :3]) == pytest.approx(1.0)
+    assert np.linalg.norm(aligned_difference(points, seen)) > 0.1
+    assert np.linalg.det(mirrored[:3, :3]) == pytest.approx(-1.0)
+    assert_allclose(seen @ mirrored[:3, :3].T + mirrored[:3, 3], points, atol=1e-12)
+    assert_allclose(nearest_rotation(np.diag([1.0, 1.0, -0.1])), np.eye(3), atol=1e-15)
+
+
+def test_sets_of_points_are_aligned_side_by_side(points):
+    seen = np.stack([noisy(points, 4), noisy(points, 5)])
+    weight = np.random.default_rng(6).uniform(0.1, 2.0, seen.shape[:-1])
+    found = rigid_motion(points, seen, weight)
+    assert found.shape == (2, 4, 4)
+    for k in range(2):
+        assert_allclose(found[k], rigid_motion(points, seen[k], weight[k]), atol=1e-14)
+
+
+def test_points_on_a_line_leave_the_same_distances_whatever_the_turn_about_it(points):
+    line = points[:, :1] * np.array([1.0, 2.0, 3.0])
+    assert_allclose(aligned_difference(line, seen_from_b(line)), 0.0, atol=1e-12)
+
+
+def test_directions_are_turned_and_not_shifted(points):
+    assert_allclose(best_rotation(points @ T_A_B[:3, :3].T, points), T_A_B[:3, :3], atol=1e-12)
 
 
 def test_any_frame_is_found(points):

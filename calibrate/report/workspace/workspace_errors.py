@@ -15,9 +15,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from calibrate.alignment import aligned_difference
 from calibrate.arms.model import KinematicModel
 from calibrate.arms.rig_arm import limits_of
-from calibrate.blunders.rough_fit import frame_between
 from calibrate.diagnose.schema import DiagnosisFile
 from calibrate.identifiability import Identifiability
 from calibrate.model_file import Covariance, Fields, FreeSpaceRecord
@@ -181,9 +181,7 @@ def _variance(known: KnownArm, points_m: Floats, slopes: Floats, rigid: Floats) 
 
 def _apart(known: KnownArm, points_m: Floats, q_rad: Floats) -> Floats:
     """(pose,) distance between the nominal and the calibrated arm, best put on each other."""
-    as_drawn = target_at(known, known.drawn, q_rad)
-    linear, shift = frame_between(as_drawn, points_m, np.ones(len(points_m)))
-    return np.linalg.norm(as_drawn @ linear.T + shift - points_m, axis=1)
+    return np.linalg.norm(aligned_difference(points_m, target_at(known, known.drawn, q_rad)), axis=1)
 
 
 SESSION = "the poses between the joint angles of the session"

@@ -12,6 +12,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from calibeam.cli import run
+from calibrate.alignment import aligned_difference
 from simulators.arm.kinematics import forward
 from simulators.conceal.case import conceal
 from simulators.conceal.case_files import at_start, write_case
@@ -64,10 +65,8 @@ def true_tip_m(case, q, via):
 
 
 def rms_error_m(reached_m, wanted_m):
-    """Of distances, after the motion that brings the one best onto the other (Kabsch)."""
-    a, b = reached_m - reached_m.mean(axis=0), wanted_m - wanted_m.mean(axis=0)
-    turn, _ = Rotation.align_vectors(b, a)
-    return float(np.sqrt(np.mean(np.sum((turn.apply(a) - b) ** 2, axis=1))))
+    """Of distances, after the motion that brings the one best onto the other."""
+    return float(np.sqrt(np.mean(np.sum(aligned_difference(wanted_m, reached_m) ** 2, axis=1))))
 
 
 @pytest.mark.endure

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from benchmarks.drawn_sessions import TARGET_M
+from calibrate.alignment import aligned_difference
 from calibrate.fit import solve
 from calibrate.identifiability import analyse
 from calibrate.uncertainty.free_space import (
@@ -30,10 +31,7 @@ def found_error_m(one):
         tool = theta[[names.index(f"tool.{a}") for a in "xyz"]]
         T = one.model.flange(own, q_rad)
         points.append(T[:, :3, :3] @ (TARGET_M + tool) + T[:, :3, 3])
-    a, b = (p - p.mean(axis=0) for p in points)
-    U, _, Vt = np.linalg.svd(a.T @ b)
-    turn = U @ np.diag([1.0, 1.0, np.linalg.det(U @ Vt)]) @ Vt
-    return np.sqrt(np.mean(np.sum((a @ turn - b) ** 2, axis=1)))
+    return np.sqrt(np.mean(np.sum(aligned_difference(*points) ** 2, axis=1)))
 
 
 def test_predicted_error_is_the_one_found_against_the_truth(fitted):
