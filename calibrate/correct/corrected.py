@@ -360,10 +360,12 @@ def _alike(frames: Floats) -> NDArray[np.intp]:
 
 
 def taken_up(keys: NDArray[np.intp], goal_m: Floats, shift_m: Floats) -> Floats:
-    """(pose,) m that frames, numbered (pose,), hold of shifts (pose, 3), wanted less reached, at poses (pose, 3)."""
-    out = np.full(len(goal_m), np.nan)
+    """(pose,) m that frames, numbered (pose,), hold of shifts (pose, 3), wanted less reached, at poses (pose, 3); NaN
+    where a pose or its shift is unknown.
+    """
+    out, known = np.full(len(goal_m), np.nan), np.isfinite(goal_m + shift_m).all(axis=1)
     for key in np.unique(keys):
-        rows = np.flatnonzero((keys == key) & np.isfinite(shift_m).all(axis=1))
+        rows = np.flatnonzero((keys == key) & known)
         if len(rows) == 0:
             continue
         twist = point_by_twist(goal_m[rows] - goal_m[rows].mean(axis=0)).reshape(-1, 6)

@@ -56,6 +56,15 @@ def test_a_taught_frame_holds_the_rigid_part_of_the_old_errors():
     assert np.nanmean(taken_up(frames, goal_m, random_m) ** 2) < 0.3 * np.mean(np.sum(random_m**2, axis=1))
 
 
+def test_poses_without_a_command_say_nothing_of_a_frame():
+    rng = np.random.default_rng(3)
+    goal_m, shift_m = rng.uniform(-0.3, 0.3, (8, 3)), np.tile([2e-4, 0.0, 1e-4], (8, 1))
+    goal_m[2], shift_m[5] = np.nan, np.nan
+    held_m = taken_up(np.zeros(8, dtype=int), goal_m, shift_m)
+    assert np.isnan(held_m[[2, 5]]).all()
+    assert held_m[[0, 1, 3, 4, 6, 7]] == pytest.approx(np.hypot(2e-4, 1e-4))
+
+
 def test_a_frame_is_fitted_to_a_table_of_points_and_a_bad_frame_is_refused(tmp_path, capsys):
     write_model(tmp_path / "model.json", model())
     header = "x_m,y_m,z_m," + ",".join(f"q{j}_rad" for j in range(1, 7))
