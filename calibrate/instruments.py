@@ -20,13 +20,14 @@ from calibrate.arms.catalogue import arm_of
 from calibrate.arms.model import KinematicModel
 from calibrate.dual_psd_rig import believed_noise
 from calibrate.errors import DataError
+from calibrate.measured import Measured
 from calibrate.parameters import start_values
 from calibrate.read_samples import Angles
 from calibrate.rigid import inverse
 from calibrate.sample_table import SampleTable
 from calibrate.sensors.catalogue import SENSORS, used_with
 from calibrate.sensors.kind import SensorKind, Trait
-from calibrate.weighting import Measured, Weighting
+from calibrate.weighting import Weighting
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]

@@ -5,36 +5,17 @@ Rows of one sample whose noise is shared with second encoders are made independe
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from calibrate.errors import DataError
 from calibrate.parameters import Parameter, index_of
-from calibrate.problem import LeastSquares, Problem
+from calibrate.problem import Block, Problem
 from calibrate.shared_scatter import SharedScatter
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
-
-
-class Block(LeastSquares, Protocol):
-    """One instrument's rows: a LeastSquares of its own that can be cut. Each row has the same number of residuals."""
-
-    @property
-    def rows(self) -> int:
-        """Observation rows: poses, pairs or known lengths; residuals stand row by row."""
-        ...
-
-    @property
-    def log_det_noise(self) -> float:
-        """Logarithm of the determinant of the covariance of all its residual values, in the units of the readings."""
-        ...
-
-    def select(self, rows: Indices) -> Self:
-        """The same block over some of its rows."""
-        ...
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,7 +1,7 @@
 """A weighted least-squares problem: residuals whitened so that noise is one, and their derivative."""
 
 from dataclasses import dataclass, replace
-from typing import Protocol
+from typing import Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +29,24 @@ class LeastSquares(Protocol):
 
     def jacobian(self, theta: Floats) -> Floats:
         """(row, param) derivative of `residual` by every parameter, free or not."""
+        ...
+
+
+class Block(LeastSquares, Protocol):
+    """One instrument's rows: a LeastSquares of its own that can be cut. Each row has the same number of residuals."""
+
+    @property
+    def rows(self) -> int:
+        """Observation rows: poses, pairs or known lengths; residuals stand row by row."""
+        ...
+
+    @property
+    def log_det_noise(self) -> float:
+        """Logarithm of the determinant of the covariance of all its residual values, in the units of the readings."""
+        ...
+
+    def select(self, rows: NDArray[np.intp]) -> Self:
+        """The same block over some of its rows."""
         ...
 
 

@@ -13,6 +13,7 @@ from acquisition.recording.samples import POSITION, TARGET
 from calibrate.alignment import Alignment, align, align_with_tool
 from calibrate.arms.model import KinematicModel
 from calibrate.errors import DataError
+from calibrate.measured import Measured
 from calibrate.observation_model import ObservationModel
 from calibrate.parameters import start_values
 from calibrate.problem import Problem
@@ -20,7 +21,6 @@ from calibrate.read_samples import Angles
 from calibrate.rigid import transform
 from calibrate.sensors.device import Device
 from calibrate.sensors.target import UNKNOWN_PLAUSIBLE_M, SeveralTargets, Target, targets_of
-from calibrate.weighting import Measured
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]

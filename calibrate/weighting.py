@@ -7,7 +7,7 @@ is taken out of the rows of the others there (calibrate/shared_scatter.py). Othe
 pose (a position and a wire) are taken as independent, and sizes of noise are found as if all rows were.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -17,9 +17,10 @@ from numpy.typing import NDArray
 
 from calibrate import variance
 from calibrate.errors import naming_undetermined
-from calibrate.joint_problem import Block, JointProblem, Witnessed
+from calibrate.joint_problem import JointProblem, Witnessed
+from calibrate.measured import Measured
 from calibrate.parameters import Parameter, priors, start_values
-from calibrate.problem import Problem
+from calibrate.problem import Block, Problem
 from calibrate.shared_scatter import Lever, SharedScatter, levers_of, shares_found, witness_of
 from calibrate.variance import FIXED, NoisyRows, VarianceFactors, as_believed, covariance_of
 
@@ -28,52 +29,6 @@ Indices = NDArray[np.intp]
 
 ENOUGH = 20_000  # rows of an instrument from which sizes of noise are found: 0.5 % of a sigma, whatever more there is
 JOINT = "joint"  # the source of noise that all instruments share
-
-
-@dataclass(frozen=True)
-class Measured:
-    """One instrument's rows. `problem` need not be weighted yet."""
-
-    name: str  # "position", "dual-psd", ...
-    problem: Problem
-    own_sigma: Mapping[str, Floats]  # source -> (row, k) as assumed, zero where the source does not reach
-    sample_rows: Indices  # (row, 1) or (row, 2): rows of the table of samples that each row was made of
-    own_correlation: Floats | None = None  # (row,) of pairs: of its own noise with the next row's, if they share a pose
-
-    def parts(self, theta: Floats, joint_rad: float) -> Floats:
-        """(1 + source, row, k, k) covariance by joints, then by each own source, at the assumed sizes."""
-        by_joint = self.problem.chain.by_joint(theta, self.problem.q_rad)
-        each = [parts_of(by_joint, joint_rad, sigma) for sigma in self.own_sigma.values()]
-        return np.stack([each[0][0], *(part[1] for part in each)])
-
-    def select(self, rows: Indices) -> "Measured":
-        """Some of the rows."""
-        own = {source: sigma[rows] for source, sigma in self.own_sigma.items()}
-        chained = None if self.own_correlation is None else self.own_correlation[rows]
-        return replace(
-            self,
-            problem=self.problem.select(rows),
-            own_sigma=own,
-            sample_rows=self.sample_rows[rows],
-            own_correlation=chained,
-        )
-
-    def weighted(self, theta: Floats, joint_rad: float, sources: Sequence[int], factors: VarianceFactors) -> Problem:
-        """The problem with weights from the noise at `theta`; `sources` are those of joints, then of its own noise."""
-        parts = self.parts(theta, joint_rad)
-        covariance = covariance_of(parts, sources, factors.log_variance)
-        problem = self.problem.with_covariance(covariance)
-        if self.own_correlation is None:
-            return problem
-        own = (covariance - covariance_of(parts[:1], sources[:1], factors.log_variance))[:, 0, 0]
-        by_joint = self.problem.chain.by_joint(theta, self.problem.q_rad)[:, 0]
-        n = self.problem.chain.model.n_joints
-        scale = joint_rad**2 * np.exp(factors.log_variance[sources[0]])
-        by_joints = scale * np.einsum("ni,ni->n", by_joint[:-1, n:], by_joint[1:, :n])
-        shared = by_joints + self.own_correlation[:-1] * np.sqrt(own[:-1] * own[1:])
-        shared = np.where(self.sample_rows[:-1, 1] == self.sample_rows[1:, 0], shared, 0.0)
-        sigma = np.sqrt(covariance[:, 0, 0])
-        return replace(problem, correlation=np.append(shared / (sigma[:-1] * sigma[1:]), 0.0))
 
 
 @dataclass(frozen=True)
@@ -111,7 +66,7 @@ class Weighting:
         """The joint problem with weights from the noise at `theta` (param,), as assumed without `factors`."""
         size = self.believed if factors is None else factors
         blocks = [
-            instrument.weighted(self.unweighted.of_block(i, theta), self.joint_rad, self._sources_of(i), size)
+            _weighted(instrument, self.unweighted.of_block(i, theta), self.joint_rad, self._sources_of(i), size)
             for i, instrument in enumerate(self.measured)
         ]
         shared = self._shared(theta)
@@ -226,13 +181,24 @@ class Weighting:
         return information, deviation, tuple(rows)
 
 
-def parts_of(by_joint: Floats, joint_rad: float, own_sigma: Floats) -> Floats:
-    """(2, row, k, k) covariance by joints, from d reading / d joints, and by the instrument's own sigmas (row, k)."""
-    arm = joint_rad**2 * by_joint @ np.swapaxes(by_joint, 1, 2)
-    own = np.zeros_like(arm)
-    each = range(own_sigma.shape[1])
-    own[:, each, each] = own_sigma**2
-    return np.stack([arm, own])
+def _weighted(
+    measured: Measured, theta: Floats, joint_rad: float, sources: Sequence[int], factors: VarianceFactors
+) -> Problem:
+    """The problem with weights from the noise at `theta`; `sources` are those of joints, then of its own noise."""
+    parts = measured.parts(theta, joint_rad)
+    covariance = covariance_of(parts, sources, factors.log_variance)
+    problem = measured.problem.with_covariance(covariance)
+    if measured.own_correlation is None:
+        return problem
+    own = (covariance - covariance_of(parts[:1], sources[:1], factors.log_variance))[:, 0, 0]
+    by_joint = measured.problem.chain.by_joint(theta, measured.problem.q_rad)[:, 0]
+    n = measured.problem.chain.model.n_joints
+    scale = joint_rad**2 * np.exp(factors.log_variance[sources[0]])
+    by_joints = scale * np.einsum("ni,ni->n", by_joint[:-1, n:], by_joint[1:, :n])
+    shared = by_joints + measured.own_correlation[:-1] * np.sqrt(own[:-1] * own[1:])
+    shared = np.where(measured.sample_rows[:-1, 1] == measured.sample_rows[1:, 0], shared, 0.0)
+    sigma = np.sqrt(covariance[:, 0, 0])
+    return replace(problem, correlation=np.append(shared / (sigma[:-1] * sigma[1:]), 0.0))
 
 
 def _thin(instrument: Measured) -> Indices | None:

@@ -27,12 +27,12 @@ from calibrate.diagnose.findings import named
 from calibrate.diagnose.fitted import Fitted, fit_geometry
 from calibrate.diagnose.folds import splits_of
 from calibrate.diagnose.line_search import refined
-from calibrate.diagnose.linearised import Accepted, Unseen
+from calibrate.diagnose.linearised import Unseen
 from calibrate.diagnose.scatter import sigma_about_zero
 from calibrate.diagnose.schema import DiagnosisFile, FindingRecord
 from calibrate.diagnose.score import scores
 from calibrate.diagnose.session import session_of
-from calibrate.effects.term import Term
+from calibrate.effects.term import Accepted, Term
 from calibrate.errors import DataError
 from calibrate.sensors.encoder_difference import NAME as ENCODER_DIFFERENCE
 

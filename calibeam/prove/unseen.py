@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 
 from calibrate.diagnose.extended import carried_over, extended, moves_tool
 from calibrate.diagnose.fitted import Fitted
-from calibrate.diagnose.linearised import Accepted
 from calibrate.diagnose.ported import perturbed_frames
 from calibrate.effects.drivers import Drivers
 from calibrate.effects.ports import Perturbation
+from calibrate.effects.term import Accepted
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]

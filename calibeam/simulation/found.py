@@ -9,12 +9,11 @@ from numpy.typing import NDArray
 
 from calibeam.simulation.rig_in_numbers import arm_in_numbers, beyond_m, light_of
 from calibrate.diagnose.causes import cause
-from calibrate.diagnose.linearised import Accepted
 from calibrate.effects.drivers import Drivers
 from calibrate.effects.gravity import likely_torque_nm
 from calibrate.effects.ports import Place, Port
 from calibrate.effects.second_encoders import AGAINST, PLACES
-from calibrate.effects.term import Term
+from calibrate.effects.term import Accepted, Term
 from calibrate.errors import DataError
 from calibrate.physics.records import Effect
 from calibrate.predict import Predictor

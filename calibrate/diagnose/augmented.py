@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from calibrate.arms.coupled_readings import by_readings, recoupled
 from calibrate.arms.serial import SerialArm
 from calibrate.diagnose.assumed import Assumed
-from calibrate.diagnose.linearised import Accepted
 from calibrate.diagnose.ported import (
     Look,
     adjoints,
@@ -24,11 +23,12 @@ from calibrate.diagnose.ported import (
 from calibrate.diagnose.session import Session
 from calibrate.effects.drivers import Drivers
 from calibrate.effects.ports import Perturbation, Place, Port
+from calibrate.effects.term import Accepted
 from calibrate.joint_problem import JointProblem
+from calibrate.measured import Measured
 from calibrate.parameters import Parameter
 from calibrate.rigid import inverse
 from calibrate.shared_scatter import SharedScatter
-from calibrate.weighting import Measured
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
@@ -232,7 +232,7 @@ class Augmented:
     def _few(self) -> Ints | None:
         """(sample,) of the active rows, where these are few; None: all, also where instruments may share scatter."""
         measured = self.session.measured
-        if any(encoder_channels(m) is not None for m in measured):
+        if any(m.encoder_channels is not None for m in measured):
             return None
         seen = [m.sample_rows[rows].ravel() for m, rows in zip(measured, self.rows, strict=True)]
         samples = np.unique(np.concatenate(seen))
@@ -325,7 +325,7 @@ class Augmented:
     @staticmethod
     def _read(measured: Measured, seen: Look, by: Perturbation) -> Floats:
         expected, rows = seen.expected, measured.sample_rows[:, -1]
-        if (channels := encoder_channels(measured)) is not None:
+        if (channels := measured.encoder_channels) is not None:
             expected = expected + by.between_rad[np.ix_(rows, channels)]
         return expected if measured.name not in by.readings else expected + by.readings[measured.name][rows]
 
@@ -401,21 +401,13 @@ def columns_of(measured: Sequence[Measured], port: Port, basis: Floats, at: Arou
     if port.place is not Place.READING:
         twists = at.twists(port, basis)
         return [
-            through(seen, m, twists)
-            if (channels := encoder_channels(m)) is None
-            else _between(port, basis, m, channels)
+            through(seen, m, twists) if (channels := m.encoder_channels) is None else _between(port, basis, m, channels)
             for seen, m in zip(at.looks, measured, strict=True)
         ]
     return [
         basis[m.sample_rows[:, -1]] if m.name == port.instrument else np.zeros((*seen.expected.shape, basis.shape[-1]))
         for seen, m in zip(at.looks, measured, strict=True)
     ]
-
-
-def encoder_channels(measured: Measured) -> Ints | None:
-    """(channel,) joints, from 0, that second encoders are read at; None: another instrument."""
-    joints = measured.problem.chain.sensor.joints_compared()
-    return np.array(joints, dtype=np.intp) - 1 if joints else None
 
 
 def _between(port: Port, basis: Floats, measured: Measured, channels: Ints) -> Floats:

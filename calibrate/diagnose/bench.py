@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibrate.diagnose.curve import unit
-from calibrate.diagnose.linearised import Accepted, State
+from calibrate.diagnose.linearised import State
 from calibrate.diagnose.score import Removed, Scores, orthonormal, removed, scores
 from calibrate.diagnose.visible import RANK, VISIBLE, Menu, Sight, beyond, blind, menu_of, sight_of
 from calibrate.effects.form import at_joint
-from calibrate.effects.term import Term
+from calibrate.effects.term import Accepted, Term
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]

@@ -29,10 +29,10 @@ from calibrate.identification.clean import refuse_most, rows_of
 from calibrate.identification.identify import impossible_rows, wrong_file
 from calibrate.identification.rounds import distances, wary_fit
 from calibrate.identification.session import columns_of, shots_of
+from calibrate.measured import Measured
 from calibrate.parameters import start_values
 from calibrate.sensors.catalogue import kind_of
 from calibrate.sensors.encoder_difference import NAME as ENCODER_DIFFERENCE
-from calibrate.weighting import Measured
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]

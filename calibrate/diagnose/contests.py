@@ -14,10 +14,10 @@ from calibrate.diagnose.elsewhere import Elsewhere, NewPoses, elsewhere
 from calibrate.diagnose.findings import named
 from calibrate.diagnose.fitted import Fitted
 from calibrate.diagnose.line_search import refined
-from calibrate.diagnose.linearised import Accepted
 from calibrate.diagnose.next_poses import COUNT, Contest, Duel, next_poses, reach_of
 from calibrate.diagnose.reachable import reachable
 from calibrate.diagnose.score import scores
+from calibrate.effects.term import Accepted
 from calibrate.sensors import spots
 
 Floats = NDArray[np.float64]

@@ -35,7 +35,7 @@ from calibrate.diagnose.findings import bare_findings, findings_of, named
 from calibrate.diagnose.folds import FOLDS, REGIONS, blocks, regions, units
 from calibrate.diagnose.hidden_levers import TIME
 from calibrate.diagnose.lack_of_fit import LackOfFit, lack_of_fit
-from calibrate.diagnose.linearised import Accepted, State
+from calibrate.diagnose.linearised import State
 from calibrate.diagnose.pruning import without
 from calibrate.diagnose.rivals import Rival, price, rivals_of
 from calibrate.diagnose.score import gain_of
@@ -45,7 +45,7 @@ from calibrate.diagnose.stages import Stage, Stages
 from calibrate.diagnose.time_left import TimeLeft, time_left
 from calibrate.diagnose.unknown import with_unknowns
 from calibrate.diagnose.unrecorded import Unrecorded, unrecorded
-from calibrate.effects.term import Missing
+from calibrate.effects.term import Accepted, Missing
 
 SPEED = "qd"
 MOTION = ("approach", "last_move")

@@ -7,23 +7,13 @@ from numpy.typing import NDArray
 
 from acquisition.recording import Samples
 from acquisition.recording.rig import Rig
-from calibrate.diagnose.session import Session
 from calibrate.effects.drivers import Drivers, Readout, conditions_of, uncoupled_samples
 from calibrate.sensors.model import Standing, Used
-from calibrate.weighting import Measured
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 HARDLY = 1e-2  # of the reach, rad, of the range of readings: an effect may be off by as much until drivers are renewed
-
-
-def drivers_of(session: Session, frames: Floats, expected: Mapping[str, Floats], own: Mapping[str, Floats]) -> Drivers:
-    """At frames (sample, joint + 1, 4, 4) and expected readings (row, k) of each instrument, with the values of its own
-    parameters.
-    """
-    readouts = {m.name: _readout(m, expected[m.name], own[m.name], frames) for m in session.measured}
-    return Drivers(**vars(session.conditions), rig=session.rig, frames=frames, readouts=readouts)
 
 
 def drivers_at(
@@ -54,12 +44,6 @@ def _reads_as(old: Readout, new: Readout) -> bool:
         if np.any(np.abs(now - was)[new.seen] > HARDLY * range_):
             return False
     return True
-
-
-def _readout(measured: Measured, expected: Floats, own: Floats, frames: Floats) -> Readout:
-    chain = measured.problem.chain
-    phi = own[len(chain.model.parameters) :]
-    return readout_at(measured.name, chain.sensor, phi, expected, measured.sample_rows[:, -1], frames)
 
 
 def readout_at(

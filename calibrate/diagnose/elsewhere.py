@@ -15,20 +15,18 @@ from acquisition.recording import Samples
 from acquisition.recording.samples import per_joint
 from calibrate.diagnose.assumed import Stated
 from calibrate.diagnose.augmented import Around, Augmented, columns_of, plain_sizes
-from calibrate.diagnose.driver_values import drivers_of
 from calibrate.diagnose.extended import alike
 from calibrate.diagnose.fitted import Fitted
-from calibrate.diagnose.linearised import Accepted
-from calibrate.diagnose.session import Session
+from calibrate.diagnose.session import Session, drivers_of
 from calibrate.effects.catalogue import terms_of
 from calibrate.effects.drivers import Drivers
 from calibrate.effects.since_model import changes
-from calibrate.effects.term import Term
+from calibrate.effects.term import Accepted, Term
 from calibrate.errors import DataError
+from calibrate.measured import Measured
 from calibrate.parameters import plausible_sizes, priors
 from calibrate.problem import whitener_of
 from calibrate.shared_scatter import SharedScatter, levers_of
-from calibrate.weighting import Measured
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]

@@ -7,11 +7,11 @@ import numpy as np
 
 from calibrate.diagnose.bench import Bench
 from calibrate.diagnose.growing import admissible
-from calibrate.diagnose.linearised import Accepted
 from calibrate.diagnose.null import is_slow
 from calibrate.diagnose.pruning import balances
 from calibrate.diagnose.score import gain_of, removed, scores
 from calibrate.diagnose.searching import BETTER, Key, Search, taken
+from calibrate.effects.term import Accepted
 
 Group = tuple[int, ...]
 

@@ -11,11 +11,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from calibrate.diagnose.linearised import Accepted
 from calibrate.effects.catalogue import terms_of
 from calibrate.effects.drivers import Drivers, Readout
 from calibrate.effects.ports import Place
-from calibrate.effects.term import Term
+from calibrate.effects.term import Accepted, Term
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]

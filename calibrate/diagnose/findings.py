@@ -21,14 +21,13 @@ from scipy.stats import poisson
 from calibrate.diagnose.bench import Bench
 from calibrate.diagnose.curve import unit_of
 from calibrate.diagnose.diagnosis import NAMED, NOT_FINAL, PLACED, UNKNOWN, Finding, Named, RivalName
-from calibrate.diagnose.linearised import Accepted
 from calibrate.diagnose.port_process import lever
 from calibrate.diagnose.pulled_back import pulled_back
 from calibrate.diagnose.rivals import Rival, confidences
 from calibrate.diagnose.score import Removed, gain_of, orthonormal, removed
 from calibrate.diagnose.searching import Search
 from calibrate.diagnose.stated_sizes import sizes_of
-from calibrate.effects.term import Size, Term, plain
+from calibrate.effects.term import Accepted, Size, Term, plain
 
 Floats = NDArray[np.float64]
 

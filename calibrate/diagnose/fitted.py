@@ -14,18 +14,18 @@ from numpy.typing import NDArray
 
 from calibrate.diagnose.assumed import Assumed
 from calibrate.diagnose.augmented import Around, Augmented, plain_sizes
-from calibrate.diagnose.driver_values import as_before, drivers_of
+from calibrate.diagnose.driver_values import as_before
 from calibrate.diagnose.in_sight import in_sight, solve_in_sight
-from calibrate.diagnose.linearised import Accepted, Rows, Unseen
+from calibrate.diagnose.linearised import Rows, Unseen
 from calibrate.diagnose.noise_of_fit import Noise, covariance_at, noise_of, whiteners_of
 from calibrate.diagnose.scatter import Scatter, likelihood_of
-from calibrate.diagnose.session import Session
+from calibrate.diagnose.session import Session, drivers_of
 from calibrate.effects.catalogue import Listed
 from calibrate.effects.drivers import Drivers
 from calibrate.effects.form import Form
 from calibrate.effects.ports import Port
 from calibrate.effects.since_model import changes
-from calibrate.effects.term import Term
+from calibrate.effects.term import Accepted, Term
 from calibrate.effects.time_laws import FEWEST_AFTER
 from calibrate.fit import FAR_START, NEAR_START, Loss, Stop, solve
 from calibrate.identification.session import believed_sigma

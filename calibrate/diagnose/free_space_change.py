@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 from calibrate.blunders.rough_fit import rough_fit
 from calibrate.diagnose.extended import carried_over, extended, moves_tool
 from calibrate.diagnose.fitted import Fitted
-from calibrate.diagnose.linearised import Accepted
 from calibrate.diagnose.ported import flange_twists, perturbed_frames
 from calibrate.effects.drivers import Drivers
 from calibrate.effects.ports import Perturbation
+from calibrate.effects.term import Accepted
 from calibrate.rigid import cross_matrix
 
 Floats = NDArray[np.float64]

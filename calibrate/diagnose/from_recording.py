@@ -31,8 +31,8 @@ from calibrate.diagnose.wild_rows import unexplained_rows
 from calibrate.effects.catalogue import missing_of
 from calibrate.effects.term import Missing
 from calibrate.identification.session import columns_of
+from calibrate.measured import Measured
 from calibrate.sensors.encoder_difference import NAME as ENCODER_DIFFERENCE
-from calibrate.weighting import Measured
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]

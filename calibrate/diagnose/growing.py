@@ -6,7 +6,6 @@ from itertools import islice
 import numpy as np
 
 from calibrate.diagnose.bench import Bench
-from calibrate.diagnose.linearised import Accepted
 from calibrate.diagnose.null import Null, is_slow
 from calibrate.diagnose.proposals import Proposal, proposals
 from calibrate.diagnose.score import Removed, Scores, orthonormal
@@ -23,7 +22,7 @@ from calibrate.diagnose.searching import (
     null_at,
 )
 from calibrate.diagnose.visible import VISIBLE
-from calibrate.effects.term import Term
+from calibrate.effects.term import Accepted, Term
 
 AT_ONCE = 4  # sure ones that are accepted before a refit
 PEERS = 8  # physics at a port that are looked at in turn for a plausible entry: ten thermometers are one growth

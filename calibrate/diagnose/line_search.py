@@ -10,10 +10,9 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
 from calibrate.diagnose.bench import Bench
-from calibrate.diagnose.linearised import Accepted
 from calibrate.diagnose.score import Removed
 from calibrate.diagnose.visible import VISIBLE
-from calibrate.effects.term import Inner, Term
+from calibrate.effects.term import Accepted, Inner, Term
 
 Floats = NDArray[np.float64]
 

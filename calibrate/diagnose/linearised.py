@@ -12,21 +12,12 @@ from numpy.typing import NDArray
 
 from calibrate.diagnose.scatter import sigma_about_zero
 from calibrate.effects.drivers import Drivers
-from calibrate.effects.term import Term
+from calibrate.effects.term import Accepted, Term
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 
 WILD = 6.0  # sigmas
-
-
-@dataclass(frozen=True)
-class Accepted:
-    """A term in the model, with its values."""
-
-    term: Term
-    coefficients: Floats  # (coefficient,)
-    inner: Floats  # (inner,)
 
 
 @dataclass(frozen=True)

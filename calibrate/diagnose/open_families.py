@@ -10,12 +10,11 @@ from numpy.typing import NDArray
 from calibrate.diagnose.bench import Bench
 from calibrate.diagnose.curve import Curve
 from calibrate.diagnose.line_search import refined, solved
-from calibrate.diagnose.linearised import Accepted
 from calibrate.diagnose.null import gains_of
 from calibrate.diagnose.port_process import WAVES, Processes, places_of, processes
 from calibrate.diagnose.score import Removed, bic_gain, scores
 from calibrate.effects.ports import Place
-from calibrate.effects.term import Term
+from calibrate.effects.term import Accepted, Term
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]

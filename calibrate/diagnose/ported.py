@@ -13,9 +13,9 @@ from scipy.spatial.transform import Rotation
 
 from calibrate.arms.serial import SerialArm, chain_frames
 from calibrate.effects.ports import Perturbation, Place, Port
+from calibrate.measured import Measured
 from calibrate.observation_model import ObservationModel
 from calibrate.rigid import cross_matrix, inverse, turn_twist
-from calibrate.weighting import Measured
 
 Floats = NDArray[np.float64]
 

@@ -11,10 +11,9 @@ import numpy as np
 
 from calibrate.diagnose.bench import Bench
 from calibrate.diagnose.line_search import refined, solved
-from calibrate.diagnose.linearised import Accepted
 from calibrate.diagnose.score import Removed, Scores, bic_gain
 from calibrate.diagnose.searching import Key, cause_of
-from calibrate.effects.term import Term
+from calibrate.effects.term import Accepted, Term
 
 REFINED = 6  # terms with inner values whose order is settled by their best values, not by those of the grid
 NEAR = 0.3  # of the best gain, or of the one to beat: what the grid shows less of, no inner value brings up to it

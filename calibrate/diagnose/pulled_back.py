@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from calibrate.diagnose.bench import Bench
 from calibrate.diagnose.causes import cause
 from calibrate.diagnose.diagnosis import Pulled
-from calibrate.diagnose.linearised import Accepted
 from calibrate.effects.drivers import Drivers
 from calibrate.effects.gravity import likely_torque_nm, overturning_nm
+from calibrate.effects.term import Accepted
 
 Floats = NDArray[np.float64]
 

@@ -11,11 +11,10 @@ from numpy.typing import NDArray
 
 from calibrate.diagnose.bench import Bench
 from calibrate.diagnose.causes import is_slow_cause
-from calibrate.diagnose.linearised import Accepted
 from calibrate.diagnose.proposals import proposals
 from calibrate.diagnose.score import Removed, gain_of, scores
 from calibrate.diagnose.searching import Key, cause_of, taken
-from calibrate.effects.term import Term
+from calibrate.effects.term import Accepted, Term
 
 Floats = NDArray[np.float64]
 

@@ -4,6 +4,7 @@ Drawings hold what data cannot see; where a rig states no tolerance, wide priors
 well-seen parameters, but keep cones, which hold no scale, from shrinking the arm.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -17,12 +18,14 @@ from calibrate.arms.belief import LinkBelief
 from calibrate.arms.catalogue import arm_of
 from calibrate.arms.serial import SerialArm
 from calibrate.default_belief import PAIR, SCALELESS, WIDE
-from calibrate.effects.drivers import Conditions, conditions_of, temperatures_of, uncoupled_samples
+from calibrate.diagnose.driver_values import readout_at
+from calibrate.effects.drivers import Conditions, Drivers, Readout, conditions_of, temperatures_of, uncoupled_samples
 from calibrate.instruments import instruments_of
+from calibrate.measured import Measured
 from calibrate.parameters import Parameter
 from calibrate.sensors.catalogue import SENSORS, names_with
 from calibrate.sensors.kind import Trait
-from calibrate.weighting import Measured, Weighting
+from calibrate.weighting import Weighting
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
@@ -88,3 +91,17 @@ def _doubted(rig: Rig, belief: LinkBelief | None) -> Rig:
 
 def _believed(p: Parameter) -> Parameter:
     return p if not p.free or np.isfinite(p.prior) else replace(p, prior=GAUGE * p.plausible)
+
+
+def drivers_of(session: Session, frames: Floats, expected: Mapping[str, Floats], own: Mapping[str, Floats]) -> Drivers:
+    """At frames (sample, joint + 1, 4, 4) and expected readings (row, k) of each instrument, with the values of its own
+    parameters.
+    """
+    readouts = {m.name: _readout(m, expected[m.name], own[m.name], frames) for m in session.measured}
+    return Drivers(**vars(session.conditions), rig=session.rig, frames=frames, readouts=readouts)
+
+
+def _readout(measured: Measured, expected: Floats, own: Floats, frames: Floats) -> Readout:
+    chain = measured.problem.chain
+    phi = own[len(chain.model.parameters) :]
+    return readout_at(measured.name, chain.sensor, phi, expected, measured.sample_rows[:, -1], frames)

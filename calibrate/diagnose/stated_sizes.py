@@ -8,12 +8,11 @@ from numpy.typing import NDArray
 
 from calibrate.diagnose.bench import Bench
 from calibrate.diagnose.line_search import telling_times
-from calibrate.diagnose.linearised import Accepted
 from calibrate.diagnose.noise_law import curvature_of
 from calibrate.effects.drivers import Drivers
 from calibrate.effects.form import Form
 from calibrate.effects.loads import doubtful_rigs
-from calibrate.effects.term import Size, Term
+from calibrate.effects.term import Accepted, Size, Term
 
 Floats = NDArray[np.float64]
 

@@ -14,7 +14,6 @@ import numpy as np
 
 from calibrate.diagnose.bench import Bench
 from calibrate.diagnose.curve import Curve
-from calibrate.diagnose.linearised import Accepted
 from calibrate.diagnose.noise_law import NoiseLaw, noise_law
 from calibrate.diagnose.null import is_slow
 from calibrate.diagnose.open_families import Allowed, Families, Offer, anything, fitted_curve, open_families
@@ -24,7 +23,7 @@ from calibrate.diagnose.search import grown_out, settled
 from calibrate.diagnose.searching import ALPHA_FURTHER, SURE, Key, Search, cause_of, holds
 from calibrate.diagnose.tail import Tail
 from calibrate.effects.ports import Place
-from calibrate.effects.term import Term
+from calibrate.effects.term import Accepted, Term
 
 DRAWS = 120
 ROOM, ALPHA_ROOM = "temp_room", 1e-4  # of a joint that seems to follow the room

@@ -189,3 +189,12 @@ def with_sigma(value: float, sigma: float) -> str:
         return f"{value:.4g}"
     decimals = decimals_of(sigma)
     return f"{value:z.{decimals}f} ± {sigma:.{decimals}f}"
+
+
+@dataclass(frozen=True)
+class Accepted:
+    """A term in the model, with its values."""
+
+    term: Term
+    coefficients: Floats  # (coefficient,)
+    inner: Floats  # (inner,)

@@ -14,9 +14,10 @@ from calibrate.errors import DataError
 from calibrate.identification.rounds import distances, wary_fit
 from calibrate.identification.session import columns_of, shots_of
 from calibrate.joint_problem import JointProblem
+from calibrate.measured import Measured
 from calibrate.parameters import priors
 from calibrate.sensors.catalogue import kind_of
-from calibrate.weighting import Measured, Weighting
+from calibrate.weighting import Weighting
 
 Floats = NDArray[np.float64]
 

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from calibrate.estimator import LEAST_SQUARES, Estimator
 from calibrate.fit import FAR_START, NEAR_START, Fit, Status, solve
 from calibrate.identifiability import Identifiability, analyse
-from calibrate.joint_problem import Block, JointProblem
+from calibrate.joint_problem import JointProblem
 from calibrate.parameters import hold, plausible_sizes
-from calibrate.problem import Problem
+from calibrate.problem import Block, Problem
 from calibrate.redundant import Redundant, reduced
 from calibrate.solvers.loss import Loss
 from calibrate.variance import VarianceFactors

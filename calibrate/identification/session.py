@@ -16,9 +16,10 @@ from calibrate.default_belief import links_of
 from calibrate.fit_plan import DEFAULT, FitPlan
 from calibrate.identification.planned import as_planned, chosen_instruments, samples_as_planned
 from calibrate.instruments import Instruments, instruments_of
+from calibrate.measured import Measured
 from calibrate.sensors.catalogue import kind_of, names_with
 from calibrate.sensors.kind import Trait
-from calibrate.weighting import Measured, Weighting
+from calibrate.weighting import Weighting
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]

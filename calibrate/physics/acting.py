@@ -18,7 +18,6 @@ from calibrate.diagnose.causes import cause
 from calibrate.diagnose.curve import curve
 from calibrate.diagnose.driver_values import drivers_at, readout_at
 from calibrate.diagnose.extended import alike, rearranged
-from calibrate.diagnose.linearised import Accepted
 from calibrate.diagnose.ported import perturbed_frames
 from calibrate.effects.catalogue import EFFECTS
 from calibrate.effects.drivers import Drivers, Readout, temperatures_of
@@ -26,7 +25,7 @@ from calibrate.effects.form import Form
 from calibrate.effects.gravity import likely_torque_nm
 from calibrate.effects.ports import Perturbation, Place, Port
 from calibrate.effects.second_encoders import SECOND, at_second_encoders
-from calibrate.effects.term import Shape, Term
+from calibrate.effects.term import Accepted, Shape, Term
 from calibrate.errors import DataError
 from calibrate.physics.records import Effect
 from calibrate.predict import Predictor, readings

@@ -3,8 +3,6 @@
 Conditions are columns of samples.csv: those an effect needs of a row, and those that it was found under. Many effects
 are stated about their session (the mean temperature, the largest torque, knots over a range), so a model keeps the
 conditions of its own samples, and new rows are appended to them when an effect is evaluated.
-
-Readings of a model's own recording less what its effects add are what a fit of geometry alone needs.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -16,18 +14,15 @@ from numpy.typing import NDArray
 
 from acquisition.recording import Samples
 from acquisition.recording.samples import SEAT, required
-from calibrate.diagnose.augmented import encoder_channels
-from calibrate.diagnose.ported import look
 from calibrate.effects.drivers import MOVED_RAD, Drivers, moves_of
 from calibrate.effects.loads import UNSTATED_CENTRE_M
 from calibrate.effects.payload_compliance import UNKNOWN_CENTRE
 from calibrate.effects.ports import Perturbation, Port
 from calibrate.errors import DataError
 from calibrate.model_file import ModelFile
-from calibrate.physics.acting import Acting, Carried, acting, arm_in, drivers_under, flange_frames, listed, range_of
+from calibrate.physics.acting import Acting, Carried, acting, drivers_under, listed, range_of
 from calibrate.physics.records import Effect
 from calibrate.predict import Predictor
-from calibrate.weighting import Measured, Weighting
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -423,27 +418,3 @@ def _lacks(column: str, rows: Bools, effects: Sequence[str]) -> tuple[str, ...]:
         f"{column} is missing in {int(rows.sum())} of {len(rows)} rows: taken as the mean of the session, sigma "
         f"widened ({', '.join(effects)})",
     )
-
-
-def without_effects(weighting: Weighting, theta: Floats, samples: Samples, model: ModelFile) -> Weighting:
-    """The same instruments at the values (param,) of a model, readings less what its effects add to them.
-
-    `samples` are those of the recording that the model was made of. DataError where an effect cannot be evaluated.
-    """
-    if not model.effects:
-        return weighting
-    predictor = Predictor.of(model)
-    by, q = effects_at(model, predictor, samples, same_session=True, doubts_too=False).by, samples.joints()
-    arm, nothing = arm_in(predictor), Perturbation.none(len(samples), samples.n_joints)
-    plain, moved = (flange_frames(arm, predictor, q, one) for one in (nothing, by))
-
-    def less(i: int, m: Measured) -> Measured:
-        own = weighting.unweighted.of_block(i, theta)
-        added = look(m, own, moved).expected - look(m, own, plain).expected
-        if (channels := encoder_channels(m)) is not None:
-            added = added + by.between_rad[np.ix_(m.sample_rows[:, -1], channels)]
-        if m.name in by.readings:
-            added = added + by.readings[m.name][m.sample_rows[:, -1]]
-        return replace(m, problem=replace(m.problem, observed=m.problem.observed - added))
-
-    return replace(weighting, measured=tuple(less(i, m) for i, m in enumerate(weighting.measured)))

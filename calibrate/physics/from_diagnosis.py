@@ -22,7 +22,6 @@ from calibrate.diagnose.extended import NEARLY, alike
 from calibrate.diagnose.findings import named
 from calibrate.diagnose.fitted import Fitted
 from calibrate.diagnose.from_recording import Diagnosed
-from calibrate.diagnose.linearised import Accepted
 from calibrate.diagnose.noise_law import curvature_of
 from calibrate.diagnose.noise_of_fit import freedom
 from calibrate.diagnose.stated_sizes import sizes_of
@@ -31,7 +30,7 @@ from calibrate.effects.drivers import Drivers
 from calibrate.effects.fixture_moved import CARRIED
 from calibrate.effects.ports import Perturbation, Place
 from calibrate.effects.second_encoders import SECOND
-from calibrate.effects.term import Shape, Size
+from calibrate.effects.term import Accepted, Shape, Size
 from calibrate.effects.time_laws import FOR_A_WHILE
 from calibrate.errors import DataError
 from calibrate.export.dh_csv import dh_table_of

@@ -14,11 +14,10 @@ from numpy.typing import NDArray
 from acquisition.recording import Samples
 from calibrate.diagnose.assumed import Assumed, Stated
 from calibrate.diagnose.fitted import Fitted, fit_from_model, fit_geometry, given
-from calibrate.diagnose.linearised import Accepted
 from calibrate.diagnose.session import Session
 from calibrate.effects.drivers import Drivers, moves_of
 from calibrate.effects.since_model import RECORDING
-from calibrate.effects.term import Shape
+from calibrate.effects.term import Accepted, Shape
 from calibrate.errors import DataError
 from calibrate.identification.session import about_of
 from calibrate.model_file import Covariance, ModelFile

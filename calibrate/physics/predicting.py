@@ -9,6 +9,8 @@ Exact, and no linearisation: behind a changed link or zero the arm moves as a wh
 The robot's own base frame is the one that lies best on the arm itself, wherever in the world the arm stands. A device
 of unknown place does not show where the base is, nor a first joint how the base is turned beside its zero. As in the
 predicted error over the workspace (uncertainty/free_space.py) such a motion of everything is no error of the arm.
+
+Readings of a model's own recording less what its effects add are what a fit of geometry alone needs.
 """
 
 from collections.abc import Callable, Sequence
@@ -22,15 +24,17 @@ from scipy.spatial.transform import Rotation
 
 from acquisition.recording import Samples
 from calibrate.arms.serial import SerialArm
-from calibrate.diagnose.ported import offsets, perturbed_frames
+from calibrate.diagnose.ported import look, offsets, perturbed_frames
 from calibrate.effects.ports import Perturbation, Port
 from calibrate.errors import DataError
+from calibrate.measured import Measured
 from calibrate.model_file import ModelFile
 from calibrate.physics.acting import Acting, arm_in, flange_frames, moved_columns
 from calibrate.physics.applied import Applied, effects_at
 from calibrate.predict import Columns, Predictor, less_cones, readings, residuals
 from calibrate.rigid import cross_matrix, inverse, transform
 from calibrate.sensors.catalogue import kind_of
+from calibrate.weighting import Weighting
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
@@ -366,3 +370,27 @@ def _about_z(angle_rad: float) -> Floats:
     out = np.eye(4)
     out[:2, :2] = [[c, -s], [s, c]]
     return out
+
+
+def without_effects(weighting: Weighting, theta: Floats, samples: Samples, model: ModelFile) -> Weighting:
+    """The same instruments at the values (param,) of a model, readings less what its effects add to them.
+
+    `samples` are those of the recording that the model was made of. DataError where an effect cannot be evaluated.
+    """
+    if not model.effects:
+        return weighting
+    predictor = Predictor.of(model)
+    by, q = effects_at(model, predictor, samples, same_session=True, doubts_too=False).by, samples.joints()
+    arm, nothing = arm_in(predictor), Perturbation.none(len(samples), samples.n_joints)
+    plain, moved = (flange_frames(arm, predictor, q, one) for one in (nothing, by))
+
+    def less(i: int, m: Measured) -> Measured:
+        own = weighting.unweighted.of_block(i, theta)
+        added = look(m, own, moved).expected - look(m, own, plain).expected
+        if (channels := m.encoder_channels) is not None:
+            added = added + by.between_rad[np.ix_(m.sample_rows[:, -1], channels)]
+        if m.name in by.readings:
+            added = added + by.readings[m.name][m.sample_rows[:, -1]]
+        return replace(m, problem=replace(m.problem, observed=m.problem.observed - added))
+
+    return replace(weighting, measured=tuple(less(i, m) for i, m in enumerate(weighting.measured)))

@@ -27,6 +27,7 @@ from calibrate.identifiability import analyse
 from calibrate.identification.planned import rig_as_planned, samples_as_planned
 from calibrate.identification.session import instruments_for_fit, standing_at
 from calibrate.joint_problem import JointProblem
+from calibrate.measured import Measured
 from calibrate.model_file import ModelFile
 from calibrate.observations import Observations
 from calibrate.parameters import Parameter, index_of, start_values, without_assumed
@@ -37,7 +38,7 @@ from calibrate.sensors import spots
 from calibrate.sensors.catalogue import kind_of
 from calibrate.uncertainty.fit_statistics import spare_readings
 from calibrate.variance import VarianceFactors, as_believed
-from calibrate.weighting import Measured, Weighting
+from calibrate.weighting import Weighting
 
 Floats = NDArray[np.float64]
 About = Mapping[str, tuple[float, ...]]
@@ -206,7 +207,7 @@ def session_evidence(recording: Recording, model: ModelFile) -> SessionEvidence:
     weighting = weighting_of(recording, model)
     theta = values_of(weighting, model)
     if model.effects:
-        from calibrate.physics.applied import without_effects  # all effects: identify finds none, and starts sooner
+        from calibrate.physics.predicting import without_effects  # all effects: identify finds none, and starts sooner
 
         weighting = without_effects(weighting, theta, recording.samples, model)
     problem = weighting.problem(theta, noise_of(weighting, model))

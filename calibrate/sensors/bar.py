@@ -12,12 +12,12 @@ from acquisition.recording.samples import BAR, BAR_END
 from calibrate.blunders.least_distance import least_distance, median
 from calibrate.blunders.witness import Otherwise, Strain, Witness, drawn_point_m, filled, thinned
 from calibrate.errors import DataError
+from calibrate.measured import Measured
 from calibrate.sample_table import SampleTable
 from calibrate.sensors.kind import SensorKind, Trait
 from calibrate.sensors.pair import PairChain
 from calibrate.sensors.seat import NOISE, predicted_tips, seat_sigma_m
 from calibrate.sensors.tip_distance import TipDistance
-from calibrate.weighting import Measured
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]

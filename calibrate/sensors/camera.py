@@ -20,13 +20,13 @@ from calibrate.alignment import align_with_tool
 from calibrate.blunders.witness import Otherwise, Strain, Witness, filled, stacked, thinned
 from calibrate.chain import Chain
 from calibrate.errors import DataError
+from calibrate.measured import Measured
 from calibrate.sample_table import SampleTable
 from calibrate.sensors.device import Device
 from calibrate.sensors.full_pose import FullPose, OrientationWitness, mounted, predicted_turns
 from calibrate.sensors.kind import Columns, Found, Frame, NoiseSource, Quantity, SensorKind, Trait
 from calibrate.sensors.position import FEWEST_POSES, PositionWitness
 from calibrate.sensors.target import UNKNOWN_PLAUSIBLE_M, Target
-from calibrate.weighting import Measured
 
 Floats = NDArray[np.float64]
 

@@ -9,13 +9,13 @@ from acquisition.recording import Samples
 from acquisition.recording.samples import POSITION
 from calibrate.blunders.witness import stacked
 from calibrate.errors import DataError
+from calibrate.measured import Measured
 from calibrate.sample_table import SampleTable
 from calibrate.sensors import full_pose, position
 from calibrate.sensors.kind import Columns, Found, SensorKind, Trait
 from calibrate.sensors.pair import PairChain
 from calibrate.sensors.position import NOISE, position_sigma_m, seen_at
 from calibrate.sensors.tip_distance import TipDistance
-from calibrate.weighting import Measured
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]

@@ -18,11 +18,11 @@ from acquisition.recording import Samples
 from acquisition.recording.samples import per_joint
 from calibrate.chain import Chain
 from calibrate.errors import DataError
+from calibrate.measured import Measured
 from calibrate.parameters import Parameter
 from calibrate.sample_table import SampleTable
 from calibrate.sensors.kind import NoiseSource, Quantity, SensorKind, Trait
 from calibrate.sensors.model import Usage
-from calibrate.weighting import Measured
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]

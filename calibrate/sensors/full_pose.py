@@ -21,6 +21,7 @@ from calibrate.blunders.finding import BlunderKind
 from calibrate.blunders.least_distance import median, weights
 from calibrate.blunders.witness import Otherwise, Strain, Witness, filled, stacked, thinned
 from calibrate.chain import Chain
+from calibrate.measured import Measured
 from calibrate.parameters import Parameter
 from calibrate.rigid import cross_matrix, left_jacobian
 from calibrate.sample_table import SampleTable
@@ -29,7 +30,6 @@ from calibrate.sensors.kind import Columns, Found, NoiseSource, Quantity, Sensor
 from calibrate.sensors.model import About, Usage
 from calibrate.sensors.position import NOISE, device_of, position_sigma_m, predicted_positions
 from calibrate.sensors.target import Target, point_by_twist
-from calibrate.weighting import Measured
 
 Floats = NDArray[np.float64]
 

@@ -17,11 +17,11 @@ from acquisition.recording.rig import Rig
 from calibrate.blunders.finding import Blunder
 from calibrate.blunders.shots import Shots
 from calibrate.blunders.witness import Witness
-from calibrate.joint_problem import Block
+from calibrate.measured import Measured
 from calibrate.parameters import Parameter
+from calibrate.problem import Block
 from calibrate.sample_table import SampleTable
 from calibrate.sensors.model import Sensor
-from calibrate.weighting import Measured
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

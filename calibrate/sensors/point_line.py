@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from acquisition.recording.samples import SPOTS
 from calibrate.chain import Chain
 from calibrate.errors import DataError
+from calibrate.measured import Measured
 from calibrate.parameters import Parameter
 from calibrate.read_samples import observations
 from calibrate.rigid import cross
@@ -25,7 +26,6 @@ from calibrate.sensors.lines import CENTRED_M, Lines, nearest_point
 from calibrate.sensors.model import Usage
 from calibrate.sensors.shared_points import SharedPoints
 from calibrate.sensors.spots import laser_of
-from calibrate.weighting import Measured
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

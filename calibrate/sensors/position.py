@@ -16,6 +16,7 @@ from calibrate.blunders.rough_fit import rough_fit_of_targets
 from calibrate.blunders.witness import ENOUGH_POSES, Otherwise, Strain, Witness, by_target, filled, stacked, thinned
 from calibrate.chain import Chain
 from calibrate.errors import DataError
+from calibrate.measured import Measured
 from calibrate.parameters import Parameter
 from calibrate.rigid import transform
 from calibrate.sample_table import SampleTable
@@ -23,7 +24,6 @@ from calibrate.sensors.device import Device
 from calibrate.sensors.kind import Columns, Found, Frame, NoiseSource, SensorKind, Trait
 from calibrate.sensors.model import About, Usage
 from calibrate.sensors.target import TARGETS, SeveralTargets, Target, point_by_twist, targets_of
-from calibrate.weighting import Measured
 
 Floats = NDArray[np.float64]
 

@@ -19,13 +19,13 @@ from calibrate.blunders.least_distance import damped, median, weights
 from calibrate.blunders.witness import Otherwise, Strain, Witness, drawn_point_m, filled
 from calibrate.chain import Chain
 from calibrate.errors import DataError
+from calibrate.measured import Measured
 from calibrate.parameters import Parameter
 from calibrate.sample_table import SampleTable
 from calibrate.sensors.kind import Columns, Found, Frame, NoiseSource, SensorKind, Trait
 from calibrate.sensors.model import About, Standing, Usage
 from calibrate.sensors.shared_points import SharedPoints
 from calibrate.sensors.target import Target, point_by_twist
-from calibrate.weighting import Measured
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

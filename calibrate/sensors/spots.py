@@ -23,7 +23,8 @@ from calibrate.blunders.witness import Otherwise, Strain, Witness, filled, stack
 from calibrate.chain import Chain
 from calibrate.default_belief import pair_of
 from calibrate.errors import DataError
-from calibrate.joint_problem import Block
+from calibrate.measured import Measured
+from calibrate.problem import Block
 from calibrate.read_samples import observations
 from calibrate.rigid import transform
 from calibrate.sample_table import SampleTable
@@ -31,7 +32,6 @@ from calibrate.sensors.dual_psd import DualPsd, Fixture
 from calibrate.sensors.kind import Columns, Found, NoiseSource, SensorKind, Trait
 from calibrate.sensors.known_distance import KnownDistances
 from calibrate.sensors.laser import LaserMount
-from calibrate.weighting import Measured
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -16,6 +16,7 @@ from calibrate.blunders.least_distance import least_distance, median
 from calibrate.blunders.witness import Otherwise, Strain, Witness, drawn_point_m, filled, thinned
 from calibrate.chain import Chain
 from calibrate.errors import DataError
+from calibrate.measured import Measured
 from calibrate.parameters import Parameter
 from calibrate.sample_table import SampleTable
 from calibrate.sensors.device import Device
@@ -23,7 +24,6 @@ from calibrate.sensors.kind import Columns, Found, NoiseSource, SensorKind, Trai
 from calibrate.sensors.model import About, Usage
 from calibrate.sensors.position import device_of
 from calibrate.sensors.target import Target, point_by_twist
-from calibrate.weighting import Measured
 
 Floats = NDArray[np.float64]
 

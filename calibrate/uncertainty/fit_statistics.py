@@ -21,8 +21,7 @@ from numpy.typing import NDArray
 from scipy.special import chdtr, chdtrc, fdtrc
 
 from calibrate.fit import Fit
-from calibrate.joint_problem import Block
-from calibrate.problem import LeastSquares
+from calibrate.problem import Block, LeastSquares
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -22,8 +22,8 @@ from numpy.typing import NDArray
 from calibrate.estimator import LEAST_SQUARES, Estimator
 from calibrate.fit import Fit, Status
 from calibrate.identifiability import analyse
-from calibrate.joint_problem import Block
 from calibrate.parameters import Parameter, start_values
+from calibrate.problem import Block
 from calibrate.redundant import reduced
 from calibrate.uncertainty.splits import Split
 

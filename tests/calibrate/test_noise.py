@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from calibrate import variance
+from calibrate.measured import parts_of
 from calibrate.variance import NoisyRows
-from calibrate.weighting import parts_of
 
 
 def draw(rng, n, joint_rad, psd_m, columns=10):

@@ -8,9 +8,9 @@ from scipy.stats import chi2
 from acquisition.recording import Samples
 from acquisition.recording.rig import load_rig
 from calibrate.diagnose.fitted import fit_geometry
-from calibrate.diagnose.linearised import Accepted
 from calibrate.diagnose.noise_of_fit import freedom
 from calibrate.diagnose.session import session_of
+from calibrate.effects.term import Accepted
 from calibrate.fit_plan import FitPlan
 from calibrate.identification.rounds import settled_fit
 from calibrate.identification.session import instruments_for_fit

@@ -5,10 +5,10 @@ import pytest
 from scipy.optimize import minimize
 
 from calibrate import variance
+from calibrate.measured import parts_of
 from calibrate.noisy_rows import NoisyRows, independent
 from calibrate.restricted_score import score_at
 from calibrate.variance import LOG_VARIANCE_PRIOR, MAX_STEPS
-from calibrate.weighting import parts_of
 
 
 def drawn(joint_rad, psd_m, believed=(3e-6, 2e-6), n=200, columns=12, seed=1):

@@ -9,13 +9,14 @@ from acquisition.recording.rig import Arm, ArmModel, Joint, Rig, Tolerance
 from calibrate import weighting as weighting_module
 from calibrate.arms.catalogue import arm_of
 from calibrate.identifiability import analyse
+from calibrate.measured import Measured
 from calibrate.parameters import hold
 from calibrate.problem import Problem, decorrelated
 from calibrate.sensors.distance import consecutive_pairs, shared_correlation
 from calibrate.sensors.pair import PairChain
 from calibrate.sensors.target import Target
 from calibrate.sensors.tip_distance import TipDistance
-from calibrate.weighting import Measured, Weighting
+from calibrate.weighting import Weighting
 
 SIGMA_M, JOINT_RAD = 50e-6, 4e-5
 

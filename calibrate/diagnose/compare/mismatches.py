@@ -19,10 +19,9 @@ from calibrate.diagnose.compare.corrected import Simulated
 from calibrate.diagnose.diagnosis import Finding, Named
 from calibrate.diagnose.findings import named
 from calibrate.diagnose.fitted import Fitted
-from calibrate.diagnose.linearised import Accepted
 from calibrate.diagnose.stated_sizes import sizes_of
 from calibrate.effects.since_model import RECORDING
-from calibrate.effects.term import Size, with_sigma
+from calibrate.effects.term import Accepted, Size, with_sigma
 
 Floats = NDArray[np.float64]
 

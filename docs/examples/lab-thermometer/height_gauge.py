@@ -7,6 +7,7 @@ import numpy as np
 
 from acquisition.recording import Samples
 from calibrate.chain import Chain
+from calibrate.measured import Measured
 from calibrate.parameters import Parameter
 from calibrate.rigid import transform
 from calibrate.sample_table import SampleTable
@@ -14,7 +15,6 @@ from calibrate.sensors.device import Device
 from calibrate.sensors.kind import Columns, Floats, Found, Frame, NoiseSource, Rows, SensorKind, Trait
 from calibrate.sensors.model import About, Usage
 from calibrate.sensors.target import Target, point_by_twist
-from calibrate.weighting import Measured
 
 COLUMN = "height_m"
 SIGMA_M = 10e-6  # one sigma to start from; the data correct it

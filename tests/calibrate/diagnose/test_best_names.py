@@ -9,10 +9,9 @@ from calibrate.diagnose.bench import Bench
 from calibrate.diagnose.doubt import with_best_names
 from calibrate.diagnose.findings import findings_of
 from calibrate.diagnose.line_search import refined
-from calibrate.diagnose.linearised import Accepted
 from calibrate.diagnose.rivals import Rival, confidences
 from calibrate.diagnose.searching import Search
-from calibrate.effects.term import Shape
+from calibrate.effects.term import Accepted, Shape
 
 
 def named(session, where, physics):

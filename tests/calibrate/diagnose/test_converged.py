@@ -7,8 +7,8 @@ from calibrate.diagnose.bench import Bench
 from calibrate.diagnose.fitted import AT_REST, SETTLED, _turn, fit_geometry
 from calibrate.diagnose.in_sight import in_sight
 from calibrate.diagnose.line_search import solved
-from calibrate.diagnose.linearised import Accepted
 from calibrate.diagnose.session import session_of
+from calibrate.effects.term import Accepted
 from calibrate.fit import Stop
 
 from .concealed import recording_of

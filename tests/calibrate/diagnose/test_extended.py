@@ -9,8 +9,8 @@ from calibrate.diagnose.elsewhere import NewPoses, elsewhere
 from calibrate.diagnose.extended import alike, carried_over, extended, moves_tool
 from calibrate.diagnose.fitted import fit_geometry
 from calibrate.diagnose.free_space_change import AMONG, free_space_change
-from calibrate.diagnose.linearised import Accepted
 from calibrate.diagnose.session import session_of
+from calibrate.effects.term import Accepted
 
 from .concealed import recording_of
 

@@ -6,11 +6,10 @@ import pytest
 from calibrate.diagnose.bench import Bench
 from calibrate.diagnose.fitted import fit_geometry
 from calibrate.diagnose.line_search import refined, telling_times
-from calibrate.diagnose.linearised import Accepted
 from calibrate.diagnose.session import session_of
 from calibrate.diagnose.stated_sizes import sandwich, sizes_of
 from calibrate.effects.loads import states_masses
-from calibrate.effects.term import Size, plain
+from calibrate.effects.term import Accepted, Size, plain
 
 from .concealed import recording_of
 

@@ -9,7 +9,6 @@ from calibrate.diagnose.bench import Bench
 from calibrate.diagnose.curve import curve
 from calibrate.diagnose.doubt import doubted, predicts
 from calibrate.diagnose.findings import findings_of, pieces
-from calibrate.diagnose.linearised import Accepted
 from calibrate.diagnose.open_families import anything, fitted_curve, open_families
 from calibrate.diagnose.port_process import places_of, processes
 from calibrate.diagnose.score import removed
@@ -18,7 +17,7 @@ from calibrate.diagnose.searching import holds
 from calibrate.diagnose.unknown import cancel, with_unknowns
 from calibrate.effects.form import Form
 from calibrate.effects.ports import Place, Port
-from calibrate.effects.term import Missing, Shape
+from calibrate.effects.term import Accepted, Missing, Shape
 
 from .conftest import Plain
 

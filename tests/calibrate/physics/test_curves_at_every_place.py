@@ -19,10 +19,10 @@ from calibrate.diagnose.bench import Bench
 from calibrate.diagnose.blunders_first import Cleared
 from calibrate.diagnose.curve import curve
 from calibrate.diagnose.fitted import fit_geometry
-from calibrate.diagnose.linearised import Accepted
 from calibrate.diagnose.port_process import places_of
 from calibrate.diagnose.session import session_of
 from calibrate.effects.ports import Place
+from calibrate.effects.term import Accepted
 from calibrate.errors import DataError
 from calibrate.physics.from_diagnosis import model_of_fit
 from calibrate.physics.predicting import predict_with_physics

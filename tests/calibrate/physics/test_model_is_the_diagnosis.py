@@ -16,10 +16,9 @@ from acquisition.recording import Samples, read
 from acquisition.recording.rig import parse_rig
 from calibrate.diagnose.blunders_first import Cleared
 from calibrate.diagnose.fitted import fit_geometry
-from calibrate.diagnose.linearised import Accepted
 from calibrate.diagnose.session import session_of
 from calibrate.effects.base_moved import EFFECT as BASE_MOVED
-from calibrate.effects.term import Shape
+from calibrate.effects.term import Accepted, Shape
 from calibrate.effects.time_laws import FOR_A_WHILE
 from calibrate.errors import DataError
 from calibrate.physics.from_diagnosis import model_of_fit
