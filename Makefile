@@ -15,7 +15,7 @@ $(READY): requirements/all.txt pyproject.toml
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements/all.txt
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
-	$(BIN)/python -m calibrate.arms
+	$(BIN)/python -m calibrate.model.arms
 	@touch $@
 
 demo: $(READY)
@@ -82,7 +82,7 @@ $(BENCH)/.ready: requirements/all.txt requirements/bench.txt pyproject.toml
 	$(PYTHON) -m venv $(BENCH)
 	$(BENCH)/bin/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements/all.txt -r requirements/bench.txt
 	$(BENCH)/bin/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
-	$(BENCH)/bin/python -m calibrate.arms
+	$(BENCH)/bin/python -m calibrate.model.arms
 	@touch $@
 
 # Renew the pins after changing pyproject.toml (needs pip-tools). Hashes only: no address enters the file.

@@ -16,8 +16,8 @@ import msgspec
 import numpy as np
 
 from calibeam.cli import run
-from calibrate.diagnose.schema import ChangedRecord, DiagnosisFile
-from calibrate.model_file import read_model
+from calibrate.diagnose.record.schema import ChangedRecord, DiagnosisFile
+from calibrate.model.model_file import read_model
 from simulators.conceal.rig import DualPsd
 from simulators.conceal.wanted import FAMILIES, ConcealError, Family
 from tests.support.pairs import Change, Pair, device, laser, laser_line, link, place, seat, tool, zero

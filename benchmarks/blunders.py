@@ -16,12 +16,12 @@ from acquisition.recording import Samples, read
 from acquisition.recording.rig import Rig
 from benchmarks.blundered import ROWS, WHOLE_FILE, Made, Mistake
 from benchmarks.healthy import INSTRUMENTS, Drawn
-from calibrate.arms.catalogue import arm_of
-from calibrate.blunders.witness import Strain
 from calibrate.errors import DataError
-from calibrate.identification.identify import refuse_wrong_file, without_blunders
-from calibrate.parameters import start_values
-from calibrate.sensors.catalogue import witnesses_of
+from calibrate.fit.identify.identify import refuse_wrong_file, without_blunders
+from calibrate.model.arms.catalogue import arm_of
+from calibrate.model.checks.witness import Strain
+from calibrate.model.parameters import start_values
+from calibrate.model.sensors.catalogue import witnesses_of
 
 REAL = ("ur5-tracker", "ur10-leica-a", "ur10-leica-b", "ur10-leica-d")
 REAL_ROWS = 200  # drawn from all over the real session for every seed, in their order

@@ -10,18 +10,18 @@ from scipy.stats import binom
 from acquisition.recording.rig import load_rig
 from benchmarks.drawn_sessions import POSITION_SIGMA_M, SPOT_SIGMA_M, T_BASE_DEVICE, TARGET_M, Bench, Session
 from benchmarks.intervals import intervals
-from calibrate.arms.catalogue import arm_of
-from calibrate.chain import Chain
-from calibrate.dual_psd_rig import dual_psd_chain
-from calibrate.fit import NEAR_START, Fit, solve
-from calibrate.identifiability import Identifiability, analyse
-from calibrate.problem import Problem
-from calibrate.redundant import reduced
-from calibrate.rigid import transform
-from calibrate.sensors.device import Device
-from calibrate.sensors.position import Position
-from calibrate.sensors.target import Target
-from calibrate.unseen_along import analyse_along
+from calibrate.fit.rank.identifiability import Identifiability, analyse
+from calibrate.fit.rank.redundant import reduced
+from calibrate.fit.rank.unseen_along import analyse_along
+from calibrate.fit.solvers import NEAR_START, Fit, solve
+from calibrate.model.arms.catalogue import arm_of
+from calibrate.model.chain import Chain
+from calibrate.model.dual_psd_rig import dual_psd_chain
+from calibrate.model.placement.device import Device
+from calibrate.model.placement.target import Target
+from calibrate.model.problem import Problem
+from calibrate.model.rigid import transform
+from calibrate.model.sensors.position import Position
 
 LEVEL = 0.95
 AIM = (0.93, 0.97)

@@ -27,12 +27,17 @@ from calibeam.prove.record import FreeSpace
 from calibeam.prove.scoring import errors_m
 from calibeam.prove.unseen import LaserBeam
 from calibeam.results.identification import Planned, identify_session
-from calibrate.believed_arm import believed_arm
-from calibrate.fit_plan import FitPlan
-from calibrate.pose_design.candidates import Candidates, blocks_of, plan_of, taken
-from calibrate.pose_design.design import Asked, design
-from calibrate.pose_design.exchange import CRITERIA
-from calibrate.pose_design.information import Information, information_of
+from calibrate.design.candidates import (
+    Candidates,
+    blocks_of,
+    plan_of,
+    taken,
+)
+from calibrate.design.design import Asked, design
+from calibrate.design.exchange import CRITERIA
+from calibrate.design.information import Information, information_of
+from calibrate.fit.fit_plan import FitPlan
+from calibrate.model.assumed_rig.assumed_arm import believed_arm
 from drivers.clock import SystemClock
 from simulators.world.truth import Truth
 from tests.support.direct_bench import direct_bench

@@ -102,8 +102,8 @@ def measured(session: Path) -> Cost:
     """In this interpreter."""
     from acquisition.recording import read
     from calibeam.results.diagnosis import diagnose_recording
-    from calibrate.diagnose.fitted import fit_geometry
-    from calibrate.diagnose.session import session_of
+    from calibrate.diagnose.state.fitted import fit_geometry
+    from calibrate.diagnose.state.session import session_of
 
     recording = read(session)
     before_mb = _peak_mb()

@@ -8,7 +8,13 @@ from pathlib import Path
 import numpy as np
 
 from acquisition.recording.rig import load_rig
-from calibrate.error_simulation.error_plan import NOTHING_STATED, ErrorPlan, SourceEntry, read_error_plan, sources_of
+from calibrate.error_simulation.error_plan import (
+    NOTHING_STATED,
+    ErrorPlan,
+    SourceEntry,
+    read_error_plan,
+    sources_of,
+)
 from calibrate.error_simulation.machine import machine_of
 from calibrate.error_simulation.monte_carlo import Drawn, draw_arms
 from calibrate.error_simulation.sensitivity import propagate

@@ -13,11 +13,11 @@ import numpy as np
 from scipy.stats import beta
 
 from acquisition.recording.session_folder import read_folder
-from calibrate.diagnose.diagnosis import Verdict
-from calibrate.diagnose.doubt import Doubted, doubted
-from calibrate.diagnose.fitted import fit_geometry
-from calibrate.diagnose.session import session_of
-from calibrate.effects.catalogue import missing_of
+from calibrate.diagnose.doubts.diagnosis import Verdict
+from calibrate.diagnose.doubts.doubt import Doubted, doubted
+from calibrate.diagnose.state.fitted import fit_geometry
+from calibrate.diagnose.state.session import session_of
+from calibrate.model.effects.catalogue import missing_of
 from simulators.conceal.case import conceal
 from simulators.conceal.case_files import write_case
 from simulators.conceal.wanted import KINDS, ConcealError, Family, Kind, Wanted

@@ -25,19 +25,28 @@ from calibeam.prove.diagnosing import Answered, diagnose_cases
 from calibeam.prove.prove import ending_early, fresh
 from calibeam.prove.seal import Layout
 from calibeam.software import SOFTWARE
-from calibrate.chain import Chain
-from calibrate.diagnose.file import read_diagnosis
-from calibrate.diagnose.fitted import Fitted, fit_geometry
-from calibrate.diagnose.folds import splits_of
-from calibrate.diagnose.schema import CurveRecord, DiagnosisFile
-from calibrate.diagnose.session import session_of
+from calibrate.diagnose.doubts.folds import splits_of
+from calibrate.diagnose.record.file import read_diagnosis
+from calibrate.diagnose.record.schema import CurveRecord, DiagnosisFile
+from calibrate.diagnose.state.fitted import Fitted, fit_geometry
+from calibrate.diagnose.state.session import session_of
 from calibrate.errors import DataError
+from calibrate.model.chain import Chain
+from calibrate.quantities import DASH, angle, length
 from calibrate.report.diagnosis.diagnosis_page import write_diagnosis_report
 from calibrate.report.diagnosis.words import verdict_words
-from calibrate.report.elements import Html, bullets, figure, page, section, table, tag, write_page
-from calibrate.report.quantities import DASH, angle, length
-from calibrate.report.svg import drawn
-from calibrate.report.tones import Tone
+from calibrate.report.elements.html import (
+    Html,
+    bullets,
+    figure,
+    page,
+    section,
+    table,
+    tag,
+    write_page,
+)
+from calibrate.report.elements.svg import drawn
+from calibrate.report.elements.tones import Tone
 
 Floats = NDArray[np.float64]
 

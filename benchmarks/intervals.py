@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import ndtri
 
-from calibrate.fit import Fit, Status
-from calibrate.identifiability import Identifiability
-from calibrate.parameters import Parameter
+from calibrate.fit.rank.identifiability import Identifiability
+from calibrate.fit.solvers import Fit, Status
+from calibrate.model.parameters import Parameter
 
 
 @dataclass(frozen=True)

@@ -9,10 +9,10 @@ import numpy as np
 from acquisition.motion.inverse.closed_form import closed_form
 from acquisition.recording.rig import load_rig
 from benchmarks.many_poses import solve_many
-from calibrate.arms.belief import HELD_AS_DRAWN
-from calibrate.arms.catalogue import dh_rows
-from calibrate.arms.dh import DhArm, DhLink
-from calibrate.arms.rig_arm import RigArm
+from calibrate.model.arms.catalogue import dh_rows
+from calibrate.model.arms.dh import DhArm, DhLink
+from calibrate.model.arms.link_tolerance import HELD_AS_DRAWN
+from calibrate.model.arms.rig_arm import RigArm
 
 POSES = 10_000
 OFF = 1e-3  # m and rad, one sigma of every parameter of a calibrated arm here

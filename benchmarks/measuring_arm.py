@@ -27,12 +27,12 @@ from benchmarks.slices import Slices
 from calibeam.guided.judge import FittedJudge
 from calibeam.guided.recorded import BelievedGuidedArm
 from calibeam.guided.refit import samples_of
-from calibrate.alignment import align
-from calibrate.identification.identify import identify
-from calibrate.identification.record import record_of
-from calibrate.identification.result import Identification
-from calibrate.model_file import RigIdentity
-from calibrate.predict import Predictor
+from calibrate.fit.identify.identify import identify
+from calibrate.fit.identify.record import record_of
+from calibrate.fit.identify.result import Identification
+from calibrate.model.alignment import align
+from calibrate.model.model_file import RigIdentity
+from calibrate.model.predict import Predictor
 from simulators.hand.held_arm import CannotReachError
 from simulators.hand.world import HandWorld
 

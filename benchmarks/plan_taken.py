@@ -19,12 +19,12 @@ from acquisition.session.session import Session
 from calibeam.devices.recorder import RecordingJournal
 from calibeam.learner import FittedLearner
 from calibeam.results.diagnosis import diagnose_recording, plan_next
-from calibrate.diagnose.bench import Bench
-from calibrate.diagnose.contests import rival_named
-from calibrate.diagnose.diagnosis import Named
-from calibrate.diagnose.fitted import Fitted, fit_geometry
-from calibrate.diagnose.line_search import refined
-from calibrate.diagnose.session import session_of
+from calibrate.diagnose.doubts.diagnosis import Named
+from calibrate.diagnose.new_poses.contests import rival_named
+from calibrate.diagnose.search.bench import Bench
+from calibrate.diagnose.search.line_search import refined
+from calibrate.diagnose.state.fitted import Fitted, fit_geometry
+from calibrate.diagnose.state.session import session_of
 from simulators.conceal.case import conceal
 from simulators.conceal.wanted import Wanted
 from simulators.defects import Defect

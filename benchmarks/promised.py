@@ -20,12 +20,18 @@ from numpy.typing import NDArray
 from acquisition.recording.rig import parse_rig
 from calibeam.cli import run
 from calibeam.motion.motion_inverse import MotionInverse
-from calibrate.alignment import rigid_motion
-from calibrate.arms.rig_arm import RigArm
-from calibrate.correct.corrected import Corrected, Options, Wanted, as_samples, correct
-from calibrate.model_file import ModelFile, read_model
-from calibrate.physics.predicting import placed
-from calibrate.predict import Predictor
+from calibrate.apply.correct.corrected import (
+    Corrected,
+    Options,
+    Wanted,
+    as_samples,
+    correct,
+)
+from calibrate.apply.predicting import placed
+from calibrate.model.alignment import rigid_motion
+from calibrate.model.arms.rig_arm import RigArm
+from calibrate.model.model_file import ModelFile, read_model
+from calibrate.model.predict import Predictor
 from simulators.arm.kinematics import forward
 from simulators.conceal import wanted as concealed
 from simulators.conceal.case import Case, conceal

@@ -23,12 +23,12 @@ from benchmarks.promised import HIDDEN, MAKES, SAMPLES, true_tips_m
 from calibeam.cli import run
 from calibeam.motion.cube_in_reach import cube_in_reach
 from calibeam.motion.motion_inverse import MotionInverse
-from calibrate.arms.rig_arm import RigArm
-from calibrate.correct.corrected import Options, Wanted, correct
+from calibrate.apply.correct.corrected import Options, Wanted, correct
 from calibrate.iso9283.attained import evaluate
 from calibrate.iso9283.performance import PoseTest
-from calibrate.model_file import read_model
-from calibrate.rigid import inverse
+from calibrate.model.arms.rig_arm import RigArm
+from calibrate.model.model_file import read_model
+from calibrate.model.rigid import inverse
 from simulators.conceal import wanted as concealed
 from simulators.conceal.case import Case, conceal
 from simulators.conceal.case_files import write_case

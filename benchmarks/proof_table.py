@@ -23,7 +23,7 @@ from calibeam.prove.tally import (
     rivals,
 )
 from calibrate.errors import DataError
-from calibrate.report.quantities import length
+from calibrate.quantities import length
 
 NUMBER = re.compile(r"\d+(?:\.\d+)?")
 BEGIN, END = "<!-- proof: begin -->", "<!-- proof: end -->"

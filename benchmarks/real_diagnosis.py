@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 from acquisition.recording import Recording, read
 from calibeam.results.diagnosis import diagnose_recording
 from calibeam.results.identification import identify_session, session_model
-from calibrate.model_file import ModelFile, read_model, write_model
-from calibrate.physics.from_diagnosis import model_of_diagnosis
-from calibrate.physics.predicting import predict_with_physics
+from calibrate.apply.predicting import predict_with_physics
+from calibrate.diagnose.with_model.from_diagnosis import model_of_diagnosis
+from calibrate.model.model_file import ModelFile, read_model, write_model
 
 BLOCKS, FOLDS = 50, 5
 XYZ = ("x_m", "y_m", "z_m")

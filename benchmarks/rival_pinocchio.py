@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from calibrate.arms.compiled import ArmConstants
+from calibrate.model.arms.compiled import ArmConstants
 
 Floats = NDArray[np.float64]
 

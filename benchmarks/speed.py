@@ -24,30 +24,30 @@ from acquisition.recording.rig import Placement, Pose, Rig, load_rig
 from acquisition.recording.samples import SPOTS
 from benchmarks import rival_pinocchio
 from benchmarks.drawn_sessions import T_BASE_DEVICE, TARGET_M, Bench, frame
-from calibrate.arms import compiled
-from calibrate.arms.catalogue import arm_of
-from calibrate.arms.serial import SerialArm
-from calibrate.chain import Chain
-from calibrate.fit import NEAR_START, Fit, solve
-from calibrate.identifiability import analyse
-from calibrate.identification.identify import identify
-from calibrate.identification.rounds import coarse_start, settled_fit
-from calibrate.identification.session import instruments_for_fit
-from calibrate.observations import Observations
-from calibrate.parameters import hold, plausible_sizes
-from calibrate.problem import Problem
-from calibrate.redundant import reduced
-from calibrate.rigid import cross_matrix
-from calibrate.sensors.device import Device
-from calibrate.sensors.position import Position
-from calibrate.sensors.target import Target
+from calibrate.fit.identify.identify import identify
+from calibrate.fit.identify.rounds import coarse_start, settled_fit
+from calibrate.fit.identify.session import instruments_for_fit
+from calibrate.fit.rank.identifiability import analyse
+from calibrate.fit.rank.redundant import reduced
+from calibrate.fit.solvers import NEAR_START, Fit, solve
+from calibrate.model.arms import compiled
+from calibrate.model.arms.catalogue import arm_of
+from calibrate.model.arms.serial import SerialArm
+from calibrate.model.chain import Chain
+from calibrate.model.observations import Observations
+from calibrate.model.parameters import hold, plausible_sizes
+from calibrate.model.placement.device import Device
+from calibrate.model.placement.target import Target
+from calibrate.model.problem import Problem
+from calibrate.model.rigid import cross_matrix
+from calibrate.model.sensors.position import Position
 
 Floats = NDArray[np.float64]
 
 SIGMA_M = 20e-6
 JOINT_SIGMA_RAD = 3e-6
 UNITS = {"ns a pose": 1e9, "ms": 1e3, "s": 1.0}
-IMPORTS = "calibrate.identification.identify, calibrate.predict, calibrate.export.export"
+IMPORTS = "calibrate.fit.identify.identify, calibrate.model.predict, calibrate.apply.export.export"
 
 
 @dataclass(frozen=True)
@@ -251,7 +251,7 @@ def _starting() -> Iterator[Row]:
         {"numpy alone": _fresh("import time; t = time.process_time(); import numpy; print(time.process_time() - t)")},
     )
     code = (
-        "import time, numpy as np; from calibrate.arms import compiled; "
+        "import time, numpy as np; from calibrate.model.arms import compiled; "
         "arm = compiled.ArmConstants(np.tile(np.eye(4), (7, 1, 1)), np.zeros(6), np.zeros(1, int), np.zeros((1, 6))); "
         "t = time.process_time(); compiled.flange(arm, np.zeros((1000, 6))); "
         "compiled.point_and_jacobian(arm, np.zeros(3), np.zeros((1000, 6))); print(time.process_time() - t)"

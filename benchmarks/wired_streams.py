@@ -18,7 +18,7 @@ from calibeam.devices.recorder import record_session
 from calibeam.devices.site import addresses_of, connected
 from calibeam.printing.progress import progress_bar
 from calibeam.results.diagnosis import diagnose_recording
-from calibrate.diagnose.schema import DiagnosisFile
+from calibrate.diagnose.record.schema import DiagnosisFile
 from calibrate.report.diagnosis.words import stream_words
 from drivers.clock import SystemClock
 from simulators.process import EmulatorProcess

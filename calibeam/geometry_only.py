@@ -3,7 +3,7 @@
 import sys
 from pathlib import Path
 
-from calibrate.model_file import ModelFile, read_model
+from calibrate.model.model_file import ModelFile, read_model
 
 
 def read_geometry(path: Path) -> ModelFile:

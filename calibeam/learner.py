@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 
 from acquisition.recording.rig import Rig
 from acquisition.session.records import Sample
-from calibrate.believed import BelievedRig
-from calibrate.believed_arm import BelievedArm
-from calibrate.believed_fixture import BelievedFixture
-from calibrate.dual_psd_rig import dual_psd_chain
-from calibrate.fit import solve
-from calibrate.parameters import Parameter
-from calibrate.problem import Problem
+from calibrate.fit.solvers import solve
+from calibrate.model.assumed_rig.assumed_arm import BelievedArm
+from calibrate.model.assumed_rig.assumed_fixture import BelievedFixture
+from calibrate.model.assumed_rig.assumed_rig import BelievedRig
+from calibrate.model.dual_psd_rig import dual_psd_chain
+from calibrate.model.parameters import Parameter
+from calibrate.model.problem import Problem
 
 Floats = NDArray[np.float64]
 

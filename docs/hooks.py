@@ -10,7 +10,7 @@ from mkdocs.structure.pages import Page
 from calibeam.cli import app
 from calibeam.command_list import COMMANDS
 from calibeam.simulation.mechanism_table import TABLE
-from calibrate.effects.catalogue import EFFECTS
+from calibrate.model.effects.catalogue import EFFECTS
 
 OPEN = "unknown"
 SHIM = "https://unpkg.com/iframe-worker/shim"  # which the theme names for pages that are opened from a folder

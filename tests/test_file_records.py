@@ -17,10 +17,10 @@ from acquisition.recording.rig import Rig
 from acquisition.recording.session_folder.stream_tables import StreamsAbout
 from calibeam.fleet.row import Row
 from calibeam.motion.task_devices import PartFile
-from calibrate.diagnose.schema import DiagnosisFile
+from calibrate.diagnose.record.schema import DiagnosisFile
 from calibrate.error_simulation.error_plan import ErrorPlan
-from calibrate.fit_plan import FitPlan
-from calibrate.model_file import ModelFile
+from calibrate.fit.fit_plan import FitPlan
+from calibrate.model.model_file import ModelFile
 
 ROOT = Path(__file__).parents[1]
 RECORDS = (Rig, PosePlan, FitPlan, ErrorPlan, TaskEntries, ModelFile, DiagnosisFile, Row, StreamsAbout, PartFile)

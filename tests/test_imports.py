@@ -30,8 +30,8 @@ def test_a_command_loads_no_library_of_another() -> None:
 def test_calibrate_loads_no_library_of_a_wire() -> None:
     """A fit runs where no port, bus or socket library is installed."""
     script = (
-        "import sys, calibrate.identification.identify, calibrate.identification.point_constraint, "
-        "calibrate.dual_psd_rig, calibrate.read_samples, acquisition.recording.mcap.read\n"
+        "import sys, calibrate.fit.identify.identify, calibrate.fit.identify.point_constraint, "
+        "calibrate.model.dual_psd_rig, calibrate.model.read_samples, acquisition.recording.mcap.read\n"
         f"print([name for name in {WIRE_LIBRARIES!r} if name in sys.modules])"
     )
     result = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=60, check=True)
@@ -47,8 +47,8 @@ def test_one_file_of_at_most_400_lines_is_compiled() -> None:
         for path in sources
         if re.search(r"^\s*(from|import) numba\b", path.read_text(), re.M)
     }
-    assert users == {"calibrate/arms/fast.py"}
-    assert len((ROOT / "calibrate/arms/fast.py").read_text().splitlines()) <= 400
+    assert users == {"calibrate/model/arms/fast.py"}
+    assert len((ROOT / "calibrate/model/arms/fast.py").read_text().splitlines()) <= 400
 
 
 def test_the_benchmarks_can_be_started() -> None:

@@ -10,15 +10,15 @@ FOLDERS = ("drivers", "acquisition", "calibrate", "calibeam")  # simulators have
 SOLVED = {"solve", "lstsq", "pinv", "inv"}
 JOINT_STEPS = {
     "acquisition/motion/inverse/solve.py": "to flange poses, and to places of a point: the inverse kinematics",
-    "calibrate/observation_model.py": "to readings of any instrument, which calibrate may not ask of acquisition",
+    "calibrate/model/observation_model.py": "to readings of any instrument, which calibrate may not ask of acquisition",
     "acquisition/centring/search.py": "two linear steps of a beam, and moves of the arm between looks at its spots",
     "acquisition/centring/registered.py": "uphill in the grip of the servo, while the beam is held",
-    "calibrate/diagnose/compare/corrected.py": "one linear step for each pose of a pair",
+    "calibrate/compare/corrected.py": "one linear step for each pose of a pair",
 }
 TURNED_PARTS = {
-    "calibrate/arms": "the arm models themselves",
-    "calibrate/diagnose/ported.py": "effects at every port of the chain",
-    "calibrate/physics/predicting.py": "the same, for the derivative by values",
+    "calibrate/model/arms": "the arm models themselves",
+    "calibrate/model/with_effects/ported_chain.py": "effects at every port of the chain",
+    "calibrate/apply/predicting.py": "the same, for the derivative by values",
     "calibeam/simulation/rig_in_numbers.py": "no kinematics: zeros go over to the simulators, which have their own",
 }
 
@@ -89,7 +89,7 @@ def test_points_are_brought_onto_points_in_one_place() -> None:
         for path, text in texts().items()
         if "align_vectors" in text or ("linalg.svd" in text and "linalg.det" in text)
     }
-    assert {path for path in found if not path.startswith("acquisition")} == {"calibrate/alignment.py"}
+    assert {path for path in found if not path.startswith("acquisition")} == {"calibrate/model/alignment.py"}
 
 
 def test_ways_to_leave_rows_out_and_chain_rules_are_stated_once() -> None:

@@ -75,28 +75,32 @@ def test_a_phase_can_be_run_alone(phase, names, monkeypatch):
     assert ran == names
 
 
-IMPORTERS = {"calibrate.rigid": {"calibrate.predict"}, "calibrate.predict": {"calibeam.cli"}, "calibeam.cli": set()}
+IMPORTERS = {
+    "calibrate.model.rigid": {"calibrate.model.predict"},
+    "calibrate.model.predict": {"calibeam.cli"},
+    "calibeam.cli": set(),
+}
 OF_TESTS = {
-    "tests/calibrate/test_rigid.py": {"calibrate.rigid"},
-    "tests/calibrate/test_predict.py": {"calibrate.predict", "numpy"},
+    "tests/calibrate/model/test_rigid.py": {"calibrate.model.rigid"},
+    "tests/calibrate/model/test_predict.py": {"calibrate.model.predict", "numpy"},
     "tests/calibeam/test_cli.py": {"calibeam.cli"},
     "tests/drivers/test_port.py": {"drivers.port"},
 }
 
 
 def test_near_is_counted_along_imports_and_what_does_not_reach_the_change_is_left_out():
-    near = distances({"calibrate/rigid.py"}, IMPORTERS, OF_TESTS)
+    near = distances({"calibrate/model/rigid.py"}, IMPORTERS, OF_TESTS)
     assert near == dict(zip(OF_TESTS, (1, 2, 3), strict=False))
     assert distances({"tests/drivers/conftest.py"}, IMPORTERS, OF_TESTS) == {"tests/drivers/test_port.py": 0}
     assert distances({"docs/index.md"}, IMPORTERS, OF_TESTS) == {}
 
 
 def test_what_a_change_touches_is_taken_from_the_nearest_on_and_the_laws_always(monkeypatch):
-    monkeypatch.setattr(fast, "changed", lambda since: {"calibrate/predict.py"})
-    monkeypatch.setattr(fast, "durations", lambda: {"tests/calibrate/test_predict.py": 3.0})
+    monkeypatch.setattr(fast, "changed", lambda since: {"calibrate/model/predict.py"})
+    monkeypatch.setattr(fast, "durations", lambda: {"tests/calibrate/model/test_predict.py": 3.0})
     files, left_out = fast.fast_files()
     assert files[: len(fast.LAWS)] == list(fast.LAWS)
-    assert "tests/calibrate/test_predict.py" in files
+    assert "tests/calibrate/model/test_predict.py" in files
     assert "farther off" in left_out
     assert not [path for path in files if on_wires(ROOT / path)]
 

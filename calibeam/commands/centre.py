@@ -119,7 +119,7 @@ def _checked(
         raise AcquisitionError(f"--first {first}: the detector that the beam strikes first is 1 or 2")
     if not tolerance_um > 0.0:
         raise AcquisitionError(f"--tolerance-um {tolerance_um:g}: above 0")
-    from calibrate.dual_psd_rig import fixture_of
+    from calibrate.model.dual_psd_rig import fixture_of
 
     half_mm = 1e3 * fixture_of(rig).half_size_m
     outside = [value for value in spots_mm if not abs(value) < half_mm]

@@ -16,14 +16,20 @@ from calibeam.console import Console
 from calibeam.motion.motion_inverse import MotionInverse
 from calibeam.outcome import PartialResult
 from calibeam.overwriting import writes
-from calibrate.arms.rig_arm import RigArm
-from calibrate.correct.corrected import Corrected, FrameError, Options, Wanted, correct
-from calibrate.correct.frames import measured_frame
-from calibrate.correct.programs.rewriting import correct_program, dialect_of
-from calibrate.correct.tables import corrected_rows, read_points, read_poses
+from calibrate.apply.correct.corrected import (
+    Corrected,
+    FrameError,
+    Options,
+    Wanted,
+    correct,
+)
+from calibrate.apply.correct.frames import measured_frame
+from calibrate.apply.correct.tables import corrected_rows, read_points, read_poses
+from calibrate.apply.programs.rewriting import correct_program, dialect_of
 from calibrate.errors import DataError
-from calibrate.model_file import ModelFile, read_model
-from calibrate.physics.applied import conditions_of_effects
+from calibrate.model.arms.rig_arm import RigArm
+from calibrate.model.model_file import ModelFile, read_model
+from calibrate.model.with_effects.applied import conditions_of_effects
 
 Floats = NDArray[np.float64]
 

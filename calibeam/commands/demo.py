@@ -24,7 +24,7 @@ from calibeam.emulation import Emulation
 from calibeam.printing.progress import progress_bar
 from calibeam.rig_files import RIGS
 from calibeam.site_log import SESSION_LOG, SITE_LOG, logged
-from calibrate.identification.estimates import JointZero
+from calibrate.fit.identify.estimates import JointZero
 from drivers.clock import SystemClock
 from simulators.world.truth import read_truth
 

@@ -14,10 +14,10 @@ from calibeam.console import Console
 from calibeam.overwriting import writes
 from calibeam.printing.progress import progress_bar
 from calibeam.software import SOFTWARE
-from calibrate.report.elements import page_output
+from calibrate.report.elements.html import page_output
 
 if TYPE_CHECKING:  # loaded when it is needed: it takes a second
-    from calibrate.pose_design.places import Places
+    from calibrate.design.places import Places
 
 Count = Annotated[int, Parameter(validator=validators.Number(gte=1))]
 Progress = Callable[[str, int, int], None]
@@ -79,9 +79,9 @@ def design_command(
     """
     from calibeam.motion.reachable_poses import candidates_of
     from calibeam.printing.design import print_design
-    from calibrate.pose_design.design import Asked, design, record_of
-    from calibrate.pose_design.information import information_of
-    from calibrate.pose_design.seen import seen_by
+    from calibrate.design.design import Asked, design, record_of
+    from calibrate.design.information import information_of
+    from calibrate.design.seen import seen_by
 
     loaded, rng, console = load_rig(rig), np.random.default_rng(seed), Console()
     with progress_bar(Console(stderr=True)) as bar:
@@ -114,9 +114,9 @@ def design_command(
 def _places(rig: Rig, poses: int, most: int, rng: np.random.Generator, progress: Progress) -> "tuple[Places, ...]":
     """Of the rig's own places and of a grid about them."""
     from calibeam.motion.reachable_poses import candidates_of, with_grid
+    from calibrate.design.information import information_of
+    from calibrate.design.places import choose_places
     from calibrate.errors import DataError
-    from calibrate.pose_design.information import information_of
-    from calibrate.pose_design.places import choose_places
 
     if rig.fixture is None or not rig.placements:
         raise DataError(

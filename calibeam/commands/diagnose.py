@@ -13,11 +13,11 @@ from calibeam.printing.progress import stages_shown
 from calibeam.printing.results import print_diagnosis, print_streams
 from calibeam.results.diagnosis import diagnose_recording, diagnose_streams, plan_next, refuse_wrong_file
 from calibeam.results.identification import naming_source
-from calibrate.diagnose.file import DIAGNOSIS, write_diagnosis
-from calibrate.model_file import MODEL, read_model, write_model
-from calibrate.physics.from_diagnosis import model_of_diagnosis
+from calibrate.diagnose.record.file import DIAGNOSIS, write_diagnosis
+from calibrate.diagnose.with_model.from_diagnosis import model_of_diagnosis
+from calibrate.model.model_file import MODEL, read_model, write_model
 from calibrate.report.diagnosis.diagnosis_page import write_diagnosis_report
-from calibrate.report.elements import page_output
+from calibrate.report.elements.html import page_output
 
 
 @writes(out=DIAGNOSIS, model_out=MODEL, report=page_output("diagnosis"), plan_out=POSE_PLAN)

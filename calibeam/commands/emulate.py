@@ -119,7 +119,7 @@ def _simulated(
         by_hand,  # the physics of a model loads the whole catalogue: only here
     )
     from calibrate.errors import DataError
-    from calibrate.model_file import read_model
+    from calibrate.model.model_file import read_model
     from simulators.defects import WrittenError
 
     given, found, notes = (None, (), ()) if model is None else emulated(read_model(model), load_rig(rig))

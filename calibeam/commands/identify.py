@@ -19,13 +19,23 @@ from calibeam.results.identification import (
     report_unfinished,
     write_session_model,
 )
+from calibrate.apply.export.export import (
+    ExportForm,
+    FormName,
+    export_model,
+    form_named,
+)
 from calibrate.errors import DataError
-from calibrate.export.export import ExportForm, FormName, export_model, form_named
-from calibrate.fit import Status
-from calibrate.identification.planned import rig_as_planned
-from calibrate.model_file import MODEL, ModelFile, read_model, write_model
-from calibrate.report.session_evidence import session_evidence
-from calibrate.sensors.catalogue import unused_columns
+from calibrate.fit.identify.planned import rig_as_planned
+from calibrate.fit.solvers import Status
+from calibrate.model.model_file import (
+    MODEL,
+    ModelFile,
+    read_model,
+    write_model,
+)
+from calibrate.model.sensors.catalogue import unused_columns
+from calibrate.report.evidence.session_evidence import session_evidence
 
 
 @writes(out=MODEL)
@@ -121,7 +131,7 @@ def _identify(
 
 
 def _refit(console: Console, recording: Path, known: ModelFile, out: Path, export: tuple[ExportForm, ...]) -> Status:
-    from calibrate.physics.beside_known import refit  # a third of a second of imports that few runs need
+    from calibrate.diagnose.with_model.later_recording import refit  # a third of a second of imports that few runs need
 
     source = read(recording)
     found = refit(known, source)

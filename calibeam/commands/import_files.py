@@ -40,7 +40,7 @@ from calibeam.asking import NotAgreedError, at_terminal, someone
 from calibeam.console import Console
 from calibeam.outcome import PartialResult, taken_back
 from calibeam.software import SOFTWARE
-from calibrate.report.quantities import counted, significant
+from calibrate.quantities import counted, significant
 
 BAG = "metadata.yaml"  # in the folder of a ROS 2 bag
 WORKBOOKS = (".xlsx", ".xlsm")

@@ -31,13 +31,18 @@ from calibeam.outcome import taken_back
 from calibeam.overwriting import writes
 from calibeam.printing.pose_test import print_pose_test
 from calibeam.software import SOFTWARE
-from calibrate.arms.rig_arm import RigArm
-from calibrate.correct.corrected import Options, Wanted, correct
+from calibrate.apply.correct.corrected import Options, Wanted, correct
 from calibrate.errors import DataError
 from calibrate.iso9283.attained import EvaluatedTest, evaluate
-from calibrate.iso9283.cube import CYCLE, CYCLES, FROM_THREE_SIDES, Plane
+from calibrate.iso9283.cube import (
+    CYCLE,
+    CYCLES,
+    FROM_THREE_SIDES,
+    Plane,
+)
 from calibrate.iso9283.performance import PoseTest
-from calibrate.model_file import ModelFile, read_model
+from calibrate.model.arms.rig_arm import RigArm
+from calibrate.model.model_file import ModelFile, read_model
 
 Floats = NDArray[np.float64]
 Count = Annotated[int, Parameter(validator=validators.Number(gte=2, lte=1000))]

@@ -10,7 +10,7 @@ from cyclopts import Parameter
 from acquisition.recording.rig import Rig, load_rig
 from calibeam.geometry_only import read_geometry
 from calibrate.errors import DataError
-from calibrate.model_file import corrections
+from calibrate.model.model_file import corrections
 from drivers.clock import SystemClock
 
 

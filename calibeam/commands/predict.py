@@ -15,10 +15,10 @@ from acquisition.recording.output import csv_text, table_output, write_output
 from acquisition.recording.rig import Rig
 from acquisition.recording.session_folder import read_csv, read_parquet
 from calibeam.overwriting import writes
+from calibrate.apply.predicting import predict_with_physics
 from calibrate.errors import DataError
-from calibrate.model_file import read_model
-from calibrate.physics.predicting import predict_with_physics
-from calibrate.predict import Predictor
+from calibrate.model.model_file import read_model
+from calibrate.model.predict import Predictor
 
 PREDICTED = table_output(("outside",), "table of predictions")
 

@@ -14,9 +14,9 @@ from calibeam.results.identification import naming_source
 from calibeam.results.reconciliation import Reconciled, reconcile
 from calibeam.results.reconciliation_page import write_reconciliation_page
 from calibeam.simulation.replayed_recording import write_replayed
-from calibrate.diagnose.file import write_diagnosis
+from calibrate.diagnose.record.file import write_diagnosis
 from calibrate.errors import DataError
-from calibrate.model_file import write_model
+from calibrate.model.model_file import write_model
 
 
 def reconcile_command(

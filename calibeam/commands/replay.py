@@ -11,8 +11,8 @@ from calibeam.outcome import taken_back
 from calibeam.results.identification import naming_source
 from calibeam.simulation.physics import names_of
 from calibeam.simulation.replayed_recording import over_noise, replay, write_replayed
-from calibrate.model_file import read_model
-from calibrate.report.quantities import angle, length
+from calibrate.model.model_file import read_model
+from calibrate.quantities import angle, length
 
 
 def replay_command(

@@ -14,11 +14,11 @@ from calibeam.overwriting import writes
 from calibeam.printing.identification import verdict_words
 from calibeam.results.identification import identify_and_judge, naming_source
 from calibeam.results.session_results import write_recording_report
-from calibrate.diagnose.file import read_diagnosis
-from calibrate.model_file import read_model
+from calibrate.diagnose.record.file import read_diagnosis
+from calibrate.model.model_file import read_model
 from calibrate.report.drift.two_calibrations import Calibration
-from calibrate.report.elements import page_output
-from calibrate.report.verdict import Answers
+from calibrate.report.elements.html import page_output
+from calibrate.report.elements.verdict import Answers
 
 MODEL, DIAGNOSIS = "model.json", "diagnosis.json"  # as sessions name them
 

@@ -17,12 +17,17 @@ from calibeam.outcome import PartialResult
 from calibeam.overwriting import writes
 from calibeam.printing.tables import print_tool_axes
 from calibeam.software import SOFTWARE
-from calibrate.arms.catalogue import arm_of
-from calibrate.arms.eccentric import with_discs
 from calibrate.errors import DataError
-from calibrate.model_file import ModelFile, RigIdentity, read_model
-from calibrate.predict import Predictor
-from calibrate.tool_axes.arm_prior import DEFAULT, ArmErrors, assumed_prior, prior_of_model
+from calibrate.model.arms.catalogue import arm_of
+from calibrate.model.arms.eccentric import with_discs
+from calibrate.model.model_file import ModelFile, RigIdentity, read_model
+from calibrate.model.predict import Predictor
+from calibrate.tool_axes.arm_prior import (
+    DEFAULT,
+    ArmErrors,
+    assumed_prior,
+    prior_of_model,
+)
 from calibrate.tool_axes.tool import calibrate_tool
 from calibrate.tool_axes.tool_file import ToolFile, tool_record
 from calibrate.tool_axes.wrist_fit import TargetRows

@@ -15,10 +15,10 @@ from calibeam.geometry_only import read_geometry
 from calibeam.outcome import CheckFailed
 from calibeam.overwriting import writes
 from calibeam.software import SOFTWARE
-from calibrate.report.elements import page_output
-from calibrate.report.quantities import DASH, length
+from calibrate.quantities import DASH, length
+from calibrate.report.elements.html import page_output
 from calibrate.report.verification_page import SAYS, write_verification_page
-from calibrate.verification.verify import Verification, verification_file, verify
+from calibrate.verify.verify import Verification, verification_file, verify
 
 
 @writes(out=json_output("calibeam-verification"), report=page_output("verification"))

@@ -26,7 +26,7 @@ from calibeam.devices.tracker_of_rig import VIEWED as TRACKER_VIEWED
 from calibeam.devices.tracker_of_rig import emulated_tracker, tracker_driver
 from calibeam.live.feed import PAGE_STOP, SILENT, Feed
 from calibeam.motion.gate_of_rig import gated_arm
-from calibrate.dual_psd_rig import fixture_of, laser_of
+from calibrate.model.dual_psd_rig import fixture_of, laser_of
 from drivers.clock import Clock
 from drivers.device import Block, Device, Movable
 from drivers.errors import DeviceError, DeviceRefused

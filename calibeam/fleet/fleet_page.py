@@ -17,10 +17,29 @@ from calibeam.fleet.drift import FEWEST, YEAR_S, Drift, Series, all_series
 from calibeam.fleet.row import Row
 from calibeam.fleet.summary import Fleet, Shared, drift_words, method_words, shared_words
 from calibeam.software import SOFTWARE
-from calibrate.report.elements import Html, bullets, figure, folded, join, page, section, table, tag, tile, write_page
-from calibrate.report.quantities import DASH, angle, doubted_angle, fixed, length, significant
-from calibrate.report.svg import drawn
-from calibrate.report.tones import PLACES, Tone
+from calibrate.quantities import (
+    DASH,
+    angle,
+    doubted_angle,
+    fixed,
+    length,
+    significant,
+)
+from calibrate.report.elements.html import (
+    Html,
+    bullets,
+    figure,
+    folded,
+    join,
+    page,
+    section,
+    table,
+    tag,
+    tile,
+    write_page,
+)
+from calibrate.report.elements.svg import drawn
+from calibrate.report.elements.tones import PLACES, Tone
 
 GRID_COLUMNS = 3
 PANEL_IN = 2.35

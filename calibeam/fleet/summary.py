@@ -9,7 +9,7 @@ from functools import cached_property
 
 from calibeam.fleet.drift import Drift, Drifts, find_drifts
 from calibeam.fleet.row import Outcome, Row
-from calibrate.report.quantities import angle, doubted_angle, significant
+from calibrate.quantities import angle, doubted_angle, significant
 
 
 @dataclass(frozen=True)

@@ -23,14 +23,14 @@ from calibeam.fleet.recordings import content_sha256
 from calibeam.fleet.row import Cause, Outcome, Row, Task, Zero
 from calibeam.results.diagnosis import diagnose_recording
 from calibeam.results.identification import JudgedModel, identify_and_judge
-from calibrate.alignment import aligned_difference
-from calibrate.arms.catalogue import arm_of
-from calibrate.arms.eccentric import with_discs
-from calibrate.diagnose.schema import DiagnosisFile
+from calibrate.diagnose.record.schema import DiagnosisFile
 from calibrate.errors import DataError
-from calibrate.model_file import Fields, ModelFile
-from calibrate.parameters import values_by_name
-from calibrate.predict import Predictor
+from calibrate.model.alignment import aligned_difference
+from calibrate.model.arms.catalogue import arm_of
+from calibrate.model.arms.eccentric import with_discs
+from calibrate.model.model_file import Fields, ModelFile
+from calibrate.model.parameters import values_by_name
+from calibrate.model.predict import Predictor
 from calibrate.report.drift.two_calibrations import drawn_values
 
 IMPORTED = "imported_from"  # note of a recording that was made of a session folder: its start is that of the import

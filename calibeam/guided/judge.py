@@ -12,14 +12,14 @@ from numpy.typing import NDArray
 from acquisition.guided.reading import BarEnd, Cone, Doubt, Reading
 from acquisition.recording.rig import Rig, Tolerance
 from calibeam.guided.refit import LIMIT_SIGMAS, Refit, assumed_prior, refit_arm, visits_of
-from calibrate.arms.catalogue import arm_of
-from calibrate.arms.eccentric import with_discs
-from calibrate.arms.model import KinematicModel
-from calibrate.default_belief import SCALELESS
-from calibrate.dual_psd_rig import believed_noise
-from calibrate.parameters import values_by_name
-from calibrate.rigid import cross_matrix
-from calibrate.sensors.seat import SEAT_BELIEVED_M
+from calibrate.model.arms.catalogue import arm_of
+from calibrate.model.arms.eccentric import with_discs
+from calibrate.model.default_tolerance import SCALELESS
+from calibrate.model.dual_psd_rig import believed_noise
+from calibrate.model.kinematic_model import KinematicModel
+from calibrate.model.parameters import values_by_name
+from calibrate.model.rigid import cross_matrix
+from calibrate.model.sensors.seat import SEAT_BELIEVED_M
 
 Floats = NDArray[np.float64]
 

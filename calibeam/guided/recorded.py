@@ -25,7 +25,7 @@ from calibeam.devices.encoders import VIEWED, emulated_encoders, encoder_driver,
 from calibeam.devices.recorder import Interrupted, uninterrupted
 from calibeam.guided.judge import FittedJudge
 from calibeam.outcome import PartialResult, interruption
-from calibrate.arms.rig_arm import RigArm
+from calibrate.model.arms.rig_arm import RigArm
 from drivers.clock import Clock
 
 Floats = NDArray[np.float64]

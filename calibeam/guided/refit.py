@@ -15,12 +15,12 @@ from acquisition.guided.reading import Cone, Reading
 from acquisition.recording import Samples
 from acquisition.recording.rig import Rig
 from acquisition.recording.samples import BAR
-from calibrate.fit import FAR_START, NEAR_START, solve
-from calibrate.identification.session import instruments_for_fit
-from calibrate.joint_problem import JointProblem
-from calibrate.parameters import Parameter, priors
-from calibrate.sensors import seat
-from calibrate.weighting import Weighting
+from calibrate.fit.identify.session import instruments_for_fit
+from calibrate.fit.joint_problem import JointProblem
+from calibrate.fit.solvers import FAR_START, NEAR_START, solve
+from calibrate.fit.weighting import Weighting
+from calibrate.model.parameters import Parameter, priors
+from calibrate.model.sensors import seat
 
 Floats = NDArray[np.float64]
 Visit = tuple[Reading, ...]  # a reading in a cone, or both ends of a bar

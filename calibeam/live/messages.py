@@ -17,10 +17,10 @@ from acquisition.recording.rig import Rig
 from acquisition.wires.psd_view import NO_LIGHT, SATURATED, PsdView
 from calibeam.live.feed import Progress
 from calibeam.live.health import Health
-from calibrate.arms.rig_arm import RigArm
-from calibrate.believed import BelievedRig
-from calibrate.believed_fixture import Light
-from calibrate.dual_psd_rig import dual_psd_chain
+from calibrate.model.arms.rig_arm import RigArm
+from calibrate.model.assumed_rig.assumed_fixture import Light
+from calibrate.model.assumed_rig.assumed_rig import BelievedRig
+from calibrate.model.dual_psd_rig import dual_psd_chain
 from drivers.device import Block
 
 Floats = NDArray[np.float64]

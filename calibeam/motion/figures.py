@@ -16,8 +16,8 @@ from acquisition.motion.plan import Plan
 from acquisition.motion.setpoints import SolvedPath
 from acquisition.recording.output import text_output, write_output
 from calibeam.motion.examples import TOOL, ExampleResult
-from calibrate.report.svg import house_style
-from calibrate.report.tones import Tone
+from calibrate.report.elements.svg import house_style
+from calibrate.report.elements.tones import Tone
 
 Floats = NDArray[np.float64]
 

@@ -16,9 +16,9 @@ from acquisition.motion.setpoints import solve_rate_hz
 from acquisition.recording.rig import ArmModel, Rig
 from acquisition.wires.streams import Pump
 from calibeam.geometry_only import read_geometry
-from calibrate.arms.rig_arm import RigArm
 from calibrate.errors import DataError
-from calibrate.model_file import corrections
+from calibrate.model.arms.rig_arm import RigArm
+from calibrate.model.model_file import corrections
 from drivers.clock import Clock
 from drivers.device import Movable
 

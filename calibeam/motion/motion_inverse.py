@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from acquisition.motion.inverse.closed_form import closed_form
 from acquisition.motion.inverse.solve import AtPose, all_solutions, refine
-from calibrate.arms.rig_arm import RigArm
+from calibrate.model.arms.rig_arm import RigArm
 
 Floats = NDArray[np.float64]
 

@@ -20,12 +20,12 @@ from acquisition.motion.inverse.solve import all_solutions
 from acquisition.recording.rig import Placement, Pose, Rig
 from acquisition.session.plan import PlanOptions
 from calibeam.motion.gate_of_rig import cell_of, solver_of
-from calibrate.arms.convert import pose_of
-from calibrate.believed import BelievedRig
-from calibrate.believed_fixture import Light
+from calibrate.design.candidates import Candidates
 from calibrate.errors import DataError
-from calibrate.pose_design.candidates import Candidates
-from calibrate.rigid import transform
+from calibrate.model.arms.convert import pose_of
+from calibrate.model.assumed_rig.assumed_fixture import Light
+from calibrate.model.assumed_rig.assumed_rig import BelievedRig
+from calibrate.model.rigid import transform
 
 HEIGHTS_M = (-0.05, 0.0, 0.15)  # beside that of the rig's first place
 RADII = (0.8, 1.0, 1.25)  # of the distance of the rig's first place from axis 1

@@ -19,7 +19,7 @@ from acquisition.recording.rig import Rig
 from acquisition.session.plan import PlanOptions, blocks
 from calibeam.learner import FittedLearner
 from calibeam.motion.gate_of_rig import cell_of
-from calibrate.arms.rig_arm import RigArm
+from calibrate.model.arms.rig_arm import RigArm
 
 Floats = NDArray[np.float64]
 

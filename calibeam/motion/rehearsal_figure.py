@@ -13,7 +13,7 @@ from acquisition.session.plan import PlanOptions
 from calibeam.motion.figures import draw_cell, write_figure
 from calibeam.motion.gate_of_rig import cell_of
 from calibeam.motion.rehearsal import Rehearsal, rehearse
-from calibrate.report.tones import Tone, tone_of
+from calibrate.report.elements.tones import Tone, tone_of
 
 Floats = NDArray[np.float64]
 

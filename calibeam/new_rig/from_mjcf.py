@@ -20,7 +20,7 @@ from acquisition.recording.files.bounds import ANGLE_RAD, LENGTH_M
 from calibeam.new_rig.drawn import ANY_TURN_RAD, DrawnArm, DrawnJoint, onto_axis
 from calibeam.new_rig.from_urdf import xml_root
 from calibrate.errors import DataError
-from calibrate.rigid import inverse, transform
+from calibrate.model.rigid import inverse, transform
 
 Floats = NDArray[np.float64]
 

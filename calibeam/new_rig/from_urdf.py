@@ -22,9 +22,9 @@ from scipy.spatial.transform import Rotation
 from acquisition.recording.files import read_text, shown
 from acquisition.recording.files.bounds import FEW
 from calibeam.new_rig.drawn import ANY_TURN_RAD, DrawnArm, DrawnJoint, onto_axis, poe_text
+from calibrate.apply.export.ur import BODIES
 from calibrate.errors import DataError
-from calibrate.export.ur import BODIES
-from calibrate.rigid import inverse
+from calibrate.model.rigid import inverse
 
 Floats = NDArray[np.float64]
 

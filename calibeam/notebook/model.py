@@ -16,9 +16,9 @@ from calibeam.notebook.tables import SCREEN, pandas_if_installed
 
 if TYPE_CHECKING:
     from calibeam.results.identification import JudgedModel
-    from calibrate.correct.corrected import Corrected, Wanted
-    from calibrate.model_file import ModelFile, ModelParameter
-    from calibrate.physics.predicting import Placed
+    from calibrate.apply.correct.corrected import Corrected, Wanted
+    from calibrate.apply.predicting import Placed
+    from calibrate.model.model_file import ModelFile, ModelParameter
 
 Floats = NDArray[np.float64]
 SAME = 1e-6  # of a rotation matrix: more than rounding, less than any slip
@@ -101,7 +101,7 @@ class Model:
         be evaluated, SamplesError where joint angles or t_s are missing.
         """
         from acquisition.recording.rig import parse_rig
-        from calibrate.physics.predicting import predict_with_physics
+        from calibrate.apply.predicting import predict_with_physics
 
         joints = parse_rig(self.file.rig.text or "", "rig.toml in the model").n_joints
         table = Samples({name: np.asarray(values) for name, values in samples.items()}, joints)
@@ -131,8 +131,8 @@ class Model:
         """
         from acquisition.recording.rig import parse_rig
         from calibeam.motion.motion_inverse import MotionInverse
-        from calibrate.arms.rig_arm import RigArm
-        from calibrate.correct.corrected import Options, correct
+        from calibrate.apply.correct.corrected import Options, correct
+        from calibrate.model.arms.rig_arm import RigArm
 
         rig = parse_rig(self.file.rig.text or "", "rig.toml in the model")
         wanted = _wanted(poses, conditions or {}, near_rad, rig.n_joints)
@@ -142,7 +142,7 @@ class Model:
 
     def _placed(self, q_rad: Floats, conditions: Conditions, same_session: bool, frame: Frame = "robot") -> "Placed":
         """ValueError for a frame of another name."""
-        from calibrate.physics.predicting import placed
+        from calibrate.apply.predicting import placed
 
         if frame not in get_args(Frame):
             raise ValueError(f"frame '{frame}': give one of {', '.join(get_args(Frame))}")
@@ -157,7 +157,7 @@ class Model:
 
     def save(self, path: Path | str) -> Path:
         """Write model.json; returns the path. OSError where it cannot be written."""
-        from calibrate.model_file import write_model
+        from calibrate.model.model_file import write_model
 
         write_model(Path(path), self.file)
         return Path(path)
@@ -169,7 +169,7 @@ class Model:
         cannot hold and for a form that there is not, OSError where it cannot be written.
         """
         from acquisition.recording.rig import parse_rig
-        from calibrate.export.export import export_model, form_named
+        from calibrate.apply.export.export import export_model, form_named
 
         rig = parse_rig(self.file.rig.text or "", "rig.toml in the model")
         return export_model(Path(path), rig, self.file, form_named(form))
@@ -187,7 +187,7 @@ class Model:
         return f"<p><b>{escape(self.says)}</b></p><ul>{reasons}</ul><table>{head}{rows}</table>{rest}"
 
     def __str__(self) -> str:
-        from calibrate.report.quantities import doubted_angle
+        from calibrate.quantities import doubted_angle
 
         lines = [self.says, *(f"  {reason}" for reason in self.reasons)]
         for joint, (zero, sigma) in self.zeros().items():
@@ -201,7 +201,7 @@ def open_model(path: Path | str) -> Model:
 
     What speaks for or against trusting it is seen from its session only: `calibeam.open(...).identify()`.
     """
-    from calibrate.model_file import read_model
+    from calibrate.model.model_file import read_model
 
     file = read_model(Path(path))
     says = f"{file.status}, {file.poses} poses; how far it can be trusted is in the report of its session"
@@ -212,8 +212,8 @@ def _wanted(
     poses: "Floats | Path | str", conditions: "Mapping[str, Floats | float]", near_rad: Floats | None, joints: int
 ) -> "Wanted":
     """DataError for poses that are no rigid motions."""
-    from calibrate.correct.corrected import Wanted
-    from calibrate.correct.tables import read_poses
+    from calibrate.apply.correct.corrected import Wanted
+    from calibrate.apply.correct.tables import read_poses
     from calibrate.errors import DataError
 
     if isinstance(poses, Path | str):

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from calibeam.results.identification import JudgedModel, ReadingErrors
-    from calibrate.diagnose.schema import DiagnosisFile
+    from calibrate.diagnose.record.schema import DiagnosisFile
 
 Floats = NDArray[np.float64]
 

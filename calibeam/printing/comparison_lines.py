@@ -18,10 +18,10 @@ from calibeam.results.comparison import (
     StreamRecord,
 )
 from calibeam.results.reconciliation import ReconcileFile
-from calibrate.diagnose.compare import mismatches
-from calibrate.diagnose.compare.mismatches import Level, in_words
-from calibrate.effects.term import Size, with_sigma
-from calibrate.report.quantities import length, significant
+from calibrate.compare import mismatches
+from calibrate.compare.mismatches import Level, in_words
+from calibrate.model.effects.term import Size, with_sigma
+from calibrate.quantities import length, significant
 
 FEW = 3  # alternatives of one
 CAUSES = frozenset(level.value for level in mismatches.CAUSES)

@@ -8,7 +8,7 @@ from rich.table import Table
 from calibeam.console import Console
 from calibeam.fleet.run import RunResult
 from calibeam.fleet.summary import Fleet, drift_words, shared_words
-from calibrate.report.quantities import counted, length
+from calibrate.quantities import counted, length
 
 SHOWN = 20  # lines of a kind; the page holds more
 

@@ -9,25 +9,41 @@ import numpy as np
 from rich.table import Table
 
 from calibeam.console import Console
-from calibrate.default_belief import said_of
-from calibrate.effects.term import Size, decimals_of, plain
-from calibrate.export.nominal_table import cells, nominal_table
-from calibrate.fit_plan import ZEROS_ONLY_COMMAND
-from calibrate.identification.estimates import ONLY_BELIEVED, JointZero
-from calibrate.identification.evidence_record import parameter_records
-from calibrate.identification.point_constraint import PointConstraints
-from calibrate.identification.result import Evidence, FreeSpace, Identification, Unseen
-from calibrate.model_file import ModelFile, ModelParameter
-from calibrate.observability import Observability
-from calibrate.physics.records import Effect
-from calibrate.report.model_tests import fit_end
-from calibrate.report.quantities import angle, counted, length, significant
-from calibrate.report.session_evidence import SessionEvidence
-from calibrate.report.session_verdict import session_verdict
-from calibrate.report.verdict import TOOL, Answers, Number, Trust, Verdict
+from calibrate.apply.export.nominal_table import cells, nominal_table
+from calibrate.fit.fit_plan import ZEROS_ONLY_COMMAND
+from calibrate.fit.identify.estimates import ONLY_BELIEVED, JointZero
+from calibrate.fit.identify.evidence_record import parameter_records
+from calibrate.fit.identify.point_constraint import PointConstraints
+from calibrate.fit.identify.result import (
+    Evidence,
+    FreeSpace,
+    Identification,
+    Unseen,
+)
+from calibrate.fit.rank.observability import Observability
+from calibrate.model.default_tolerance import said_of
+from calibrate.model.effect_records import Effect
+from calibrate.model.effects.term import Size, decimals_of, plain
+from calibrate.model.model_file import ModelFile, ModelParameter
+from calibrate.model.sensors import spots
+from calibrate.model.sensors.catalogue import SENSORS, thousandth_of
+from calibrate.quantities import (
+    angle,
+    counted,
+    length,
+    significant,
+)
+from calibrate.report.elements.verdict import (
+    TOOL,
+    Answers,
+    Number,
+    Trust,
+    Verdict,
+)
+from calibrate.report.evidence.model_tests import fit_end
+from calibrate.report.evidence.session_evidence import SessionEvidence
+from calibrate.report.evidence.session_verdict import session_verdict
 from calibrate.report.workspace.workspace_errors import session_room, tool_numbers
-from calibrate.sensors import spots
-from calibrate.sensors.catalogue import SENSORS, thousandth_of
 
 COLOUR = {Trust.GOOD: "green", Trust.CARE: "yellow", Trust.NONE: "red"}
 

@@ -5,8 +5,9 @@ from collections.abc import Iterator
 from rich.table import Table
 
 from calibeam.console import Console
-from calibrate.diagnose.schema import ClockRecord, DiagnosisFile, FindingRecord
-from calibrate.effects.term import with_sigma
+from calibrate.diagnose.record.schema import ClockRecord, DiagnosisFile, FindingRecord
+from calibrate.model.effects.term import with_sigma
+from calibrate.quantities import counted
 from calibrate.report.diagnosis.words import (
     SPLITS,
     before_after,
@@ -20,7 +21,6 @@ from calibrate.report.diagnosis.words import (
     stream_words,
     verdict_words,
 )
-from calibrate.report.quantities import counted
 
 MOST = 8  # of what is of less weight; all of it stands in the file
 

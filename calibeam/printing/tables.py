@@ -7,8 +7,20 @@ from rich.table import Table
 
 from calibeam.console import Console
 from calibrate.error_simulation.simulate import SHARE, Simulation
-from calibrate.report.quantities import DASH, angle, decimals_of, fixed, length, significant
-from calibrate.tool_axes.tool_file import ArmErrorsRecord, AxisRecord, TargetRecord, ToolFile
+from calibrate.quantities import (
+    DASH,
+    angle,
+    decimals_of,
+    fixed,
+    length,
+    significant,
+)
+from calibrate.tool_axes.tool_file import (
+    ArmErrorsRecord,
+    AxisRecord,
+    TargetRecord,
+    ToolFile,
+)
 
 COLOUR = {"yes": "green", "with care": "yellow", "no": "red"}
 WHERE = "in the flange"

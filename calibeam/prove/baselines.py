@@ -12,7 +12,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from calibrate.diagnose.fitted import Fitted
+from calibrate.diagnose.state.fitted import Fitted
 
 Floats = NDArray[np.float64]
 

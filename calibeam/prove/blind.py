@@ -37,7 +37,7 @@ def answer(recording: Path, asked: Path, out: Path, simulation: Path) -> None:
     from calibeam.prove.unseen import read_asked, tool_at, write_unseen
     from calibeam.results.comparison import compare
     from calibeam.results.diagnosis import diagnose_recording
-    from calibrate.diagnose.file import write_diagnosis
+    from calibrate.diagnose.record.file import write_diagnosis
 
     out.mkdir(parents=True, exist_ok=True)
     if simulation.is_dir():
@@ -57,7 +57,7 @@ def answer(recording: Path, asked: Path, out: Path, simulation: Path) -> None:
 
 def forget(physics: Sequence[str]) -> None:
     """Take effects out of the catalogue: a check that what is not known is called unknown, and not another name."""
-    from calibrate.effects import catalogue
+    from calibrate.model.effects import catalogue
 
     catalogue.EFFECTS = tuple(e for e in catalogue.EFFECTS if e.physics not in physics)
 

@@ -21,20 +21,20 @@ from calibeam.prove.scoring import errors_m, same_place
 from calibeam.prove.seal import Layout
 from calibeam.prove.unseen import read_asked, tool_at
 from calibeam.worker_processes import in_workers
-from calibrate.diagnose.bench import Bench
-from calibrate.diagnose.file import read_diagnosis
-from calibrate.diagnose.findings import named
-from calibrate.diagnose.fitted import Fitted, fit_geometry
-from calibrate.diagnose.folds import splits_of
-from calibrate.diagnose.line_search import refined
-from calibrate.diagnose.linearised import Unseen
-from calibrate.diagnose.scatter import sigma_about_zero
-from calibrate.diagnose.schema import DiagnosisFile, FindingRecord
-from calibrate.diagnose.score import scores
-from calibrate.diagnose.session import session_of
-from calibrate.effects.term import Accepted, Term
+from calibrate.diagnose.doubts.findings import named
+from calibrate.diagnose.doubts.folds import splits_of
+from calibrate.diagnose.record.file import read_diagnosis
+from calibrate.diagnose.record.schema import DiagnosisFile, FindingRecord
+from calibrate.diagnose.search.bench import Bench
+from calibrate.diagnose.search.line_search import refined
+from calibrate.diagnose.search.score import scores
+from calibrate.diagnose.state.fitted import Fitted, fit_geometry
+from calibrate.diagnose.state.linearised import Unseen
+from calibrate.diagnose.state.session import session_of
 from calibrate.errors import DataError
-from calibrate.sensors.encoder_difference import NAME as ENCODER_DIFFERENCE
+from calibrate.fit.noise.scatter import sigma_about_zero
+from calibrate.model.effects.term import Accepted, Term
+from calibrate.model.sensors.encoder_difference import NAME as ENCODER_DIFFERENCE
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]

@@ -22,8 +22,8 @@ from calibeam.prove.scoring import added_noise_m
 from calibeam.prove.seal import Layout, open_seal
 from calibeam.results.reconciliation import AGREES, ReconcileFile
 from calibeam.software import SOFTWARE
-from calibrate.diagnose.file import read_diagnosis
-from calibrate.diagnose.schema import DiagnosisFile
+from calibrate.diagnose.record.file import read_diagnosis
+from calibrate.diagnose.record.schema import DiagnosisFile
 from simulators.conceal.wanted import Family
 
 SHARES: dict[Kind, float] = {"one": 0.35, "three": 0.25, "encoders": 0.2, "outside": 0.1, "none": 0.1}

@@ -27,10 +27,20 @@ from calibeam.prove.tally import (
     rivals,
     share,
 )
-from calibrate.report.elements import Html, bullets, figure, folded, page, section, table, tag, write_page
-from calibrate.report.quantities import DASH, length
-from calibrate.report.svg import drawn
-from calibrate.report.tones import Tone
+from calibrate.quantities import DASH, length
+from calibrate.report.elements.html import (
+    Html,
+    bullets,
+    figure,
+    folded,
+    page,
+    section,
+    table,
+    tag,
+    write_page,
+)
+from calibrate.report.elements.svg import drawn
+from calibrate.report.elements.tones import Tone
 
 
 def summary(cases: Sequence[CaseScore]) -> list[str]:

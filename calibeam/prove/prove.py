@@ -19,8 +19,8 @@ from calibeam.prove.scenario import DEVELOPMENT, Mix
 from calibeam.prove.scoring import score
 from calibeam.prove.seal import Layout, open_seal
 from calibeam.software import SOFTWARE
-from calibrate.effects.catalogue import EFFECTS
 from calibrate.errors import DataError
+from calibrate.model.effects.catalogue import EFFECTS
 
 Tell = Callable[[str], None]
 

@@ -32,10 +32,10 @@ from calibeam.prove.record import UNKNOWN, CaseScore, DefectScore, FreeSpace, Na
 from calibeam.prove.scenario import Scenario
 from calibeam.prove.seal import Layout
 from calibeam.prove.unseen import LaserBeam, Tool, read_unseen
-from calibrate.alignment import aligned_difference
-from calibrate.diagnose.file import read_diagnosis
-from calibrate.diagnose.scatter import sigma_about_zero
-from calibrate.diagnose.schema import DiagnosisFile, FindingRecord, NameRecord
+from calibrate.diagnose.record.file import read_diagnosis
+from calibrate.diagnose.record.schema import DiagnosisFile, FindingRecord, NameRecord
+from calibrate.fit.noise.scatter import sigma_about_zero
+from calibrate.model.alignment import aligned_difference
 
 
 @dataclass(frozen=True)

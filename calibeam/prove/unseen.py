@@ -12,12 +12,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from calibrate.diagnose.extended import carried_over, extended, moves_tool
-from calibrate.diagnose.fitted import Fitted
-from calibrate.diagnose.ported import perturbed_frames
-from calibrate.effects.drivers import Drivers
-from calibrate.effects.ports import Perturbation
-from calibrate.effects.term import Accepted
+from calibrate.diagnose.state.fitted import Fitted
+from calibrate.model.effects.drivers import Drivers
+from calibrate.model.effects.ports import Perturbation
+from calibrate.model.effects.term import Accepted
+from calibrate.model.with_effects.new_poses import carried_over, extended, moves_tool
+from calibrate.model.with_effects.ported_chain import perturbed_frames
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]

@@ -17,15 +17,44 @@ from acquisition.recording import Recording, Samples
 from calibeam.results.diagnosis import SEED
 from calibeam.results.simulator import simulated_by_model
 from calibeam.software import SOFTWARE
-from calibrate.diagnose.compare.beside import Beside, Constant, begin, beside, beside_structure, set_alike
-from calibrate.diagnose.compare.chain import READINGS, Difference, Pair, columns_of, differences, of_rig
-from calibrate.diagnose.compare.corrected import compared_session, corrected_samples, simulated_of
-from calibrate.diagnose.compare.matched import Key, Matched, match, zeros_between
-from calibrate.diagnose.compare.mismatches import Level, Mismatch, Side, mismatches
-from calibrate.diagnose.compare.own_noise import chance_of_structure
-from calibrate.diagnose.compare.parted import ALARM, ROUNDING, Parted, judged
-from calibrate.diagnose.compare.rig_keys import RigKey, rig_differences
-from calibrate.diagnose.compare.streams import (
+from calibrate.compare.beside_simulation import (
+    Beside,
+    Constant,
+    begin,
+    beside,
+    beside_structure,
+    set_alike,
+)
+from calibrate.compare.chain import (
+    READINGS,
+    Difference,
+    Pair,
+    columns_of,
+    differences,
+    of_rig,
+)
+from calibrate.compare.corrected import compared_session, corrected_samples, simulated_of
+from calibrate.compare.link_differs import (
+    ALARM,
+    ROUNDING,
+    Parted,
+    judged,
+)
+from calibrate.compare.matched import (
+    Key,
+    Matched,
+    match,
+    zeros_between,
+)
+from calibrate.compare.mismatches import (
+    Level,
+    Mismatch,
+    Side,
+    mismatches,
+)
+from calibrate.compare.own_noise import chance_of_structure
+from calibrate.compare.rig_keys import RigKey, rig_differences
+from calibrate.compare.streams import (
     NoiseDifference,
     StreamDifference,
     StreamPair,
@@ -34,19 +63,19 @@ from calibrate.diagnose.compare.streams import (
     stream_differences,
     stream_pairs,
 )
-from calibrate.diagnose.diagnosis import Named, Verdict
-from calibrate.diagnose.fitted import Fitted
-from calibrate.diagnose.schema import DiagnosisFile, SizeRecord
+from calibrate.diagnose.doubts.diagnosis import Named, Verdict
+from calibrate.diagnose.record.schema import DiagnosisFile, SizeRecord
+from calibrate.diagnose.record.to_file import file_of
+from calibrate.diagnose.state.fitted import Fitted
 from calibrate.diagnose.streams.from_recording import streams_of
 from calibrate.diagnose.streams.recorded import devices_of
-from calibrate.diagnose.to_file import file_of
-from calibrate.effects.term import Size, plain
 from calibrate.errors import DataError
-from calibrate.identification.identify import wrong_file
-from calibrate.model_file import ModelFile
-from calibrate.predict import Predictor
-from calibrate.report.quantities import angle, length
-from calibrate.sensors.catalogue import kind_of
+from calibrate.fit.identify.identify import wrong_file
+from calibrate.model.effects.term import Size, plain
+from calibrate.model.model_file import ModelFile
+from calibrate.model.predict import Predictor
+from calibrate.model.sensors.catalogue import kind_of
+from calibrate.quantities import angle, length
 
 Floats = NDArray[np.float64]
 

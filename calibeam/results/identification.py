@@ -16,20 +16,26 @@ from acquisition.recording import Recording, readings_sha256
 from acquisition.recording.rig import ArmModel, Rig, rig_sha256
 from acquisition.recording.samples import measured_sha256
 from calibeam.outcome import PartialResult
-from calibrate.converted_rig import rig_in_model
+from calibrate.apply.export.dh_csv import dh_table_of
+from calibrate.apply.predicting import as_fitted
 from calibrate.errors import DataError
-from calibrate.export.dh_csv import dh_table_of
-from calibrate.fit import Status
-from calibrate.fit_plan import DEFAULT, FitPlan, parse_plan, read_plan, zeros_only_text
-from calibrate.identification.estimates import Estimate
-from calibrate.identification.identify import identify
-from calibrate.identification.record import record_of
-from calibrate.identification.result import Identification
-from calibrate.model_file import ModelFile, RigIdentity, write_model
-from calibrate.physics.predicting import as_fitted
-from calibrate.report.session_evidence import session_evidence
-from calibrate.report.session_verdict import session_verdict
-from calibrate.report.verdict import Verdict
+from calibrate.fit.fit_plan import (
+    DEFAULT,
+    FitPlan,
+    parse_plan,
+    read_plan,
+    zeros_only_text,
+)
+from calibrate.fit.identify.estimates import Estimate
+from calibrate.fit.identify.identify import identify
+from calibrate.fit.identify.record import record_of
+from calibrate.fit.identify.result import Identification
+from calibrate.fit.solvers import Status
+from calibrate.model.converted_rig import rig_in_model
+from calibrate.model.model_file import ModelFile, RigIdentity, write_model
+from calibrate.report.elements.verdict import Verdict
+from calibrate.report.evidence.session_evidence import session_evidence
+from calibrate.report.evidence.session_verdict import session_verdict
 
 UNFINISHED = (Status.OUT_OF_STEPS, Status.STALLED, Status.AT_BOUND)
 

@@ -22,21 +22,26 @@ from calibeam.results.diagnosis import diagnose_recording
 from calibeam.results.identification import Planned, identify_session, session_model
 from calibeam.simulation.replayed_recording import Replayed, replay
 from calibeam.software import SOFTWARE
-from calibrate.diagnose.compare.beside import device_between
-from calibrate.diagnose.compare.corrected import corrected_samples, simulated_of
-from calibrate.diagnose.compare.matched import match
-from calibrate.diagnose.compare.seated import is_seated
-from calibrate.diagnose.diagnosis import Verdict
+from calibrate.compare.beside_simulation import device_between
+from calibrate.compare.corrected import corrected_samples, simulated_of
+from calibrate.compare.matched import match
+from calibrate.compare.seated import is_seated
+from calibrate.diagnose.doubts.diagnosis import Verdict
 from calibrate.diagnose.from_recording import FEWEST, Diagnosed
-from calibrate.diagnose.schema import DiagnosisFile
-from calibrate.diagnose.session import session_of
+from calibrate.diagnose.record.schema import DiagnosisFile
+from calibrate.diagnose.state.session import session_of
+from calibrate.diagnose.with_model.from_diagnosis import model_of_diagnosis, model_of_fit
 from calibrate.errors import DataError
-from calibrate.fit_plan import FitPlan
-from calibrate.model_file import ModelFile
-from calibrate.physics.from_diagnosis import model_of_diagnosis, model_of_fit
-from calibrate.report.quantities import counted, length, significant
-from calibrate.sensors import full_pose, position, spots, wire
-from calibrate.sensors.target import TARGETS
+from calibrate.fit.fit_plan import FitPlan
+from calibrate.model.model_file import ModelFile
+from calibrate.model.placement.target import TARGETS
+from calibrate.model.sensors import (
+    full_pose,
+    position,
+    spots,
+    wire,
+)
+from calibrate.quantities import counted, length, significant
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

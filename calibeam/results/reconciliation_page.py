@@ -8,11 +8,22 @@ from matplotlib.figure import Figure
 
 from calibeam.results.reconciliation import AGREES, BEYOND, Reconciled, ReconcileFile, RowRecord, UnseenRecord
 from calibeam.software import SOFTWARE
+from calibrate.quantities import length, significant
 from calibrate.report.diagnosis.finding_page import chain_figure, chain_of
-from calibrate.report.elements import Html, bullets, figure, page, panels, section, table, tag, tile, write_page
-from calibrate.report.quantities import length, significant
-from calibrate.report.svg import drawn, log_axis
-from calibrate.report.tones import Tone
+from calibrate.report.elements.html import (
+    Html,
+    bullets,
+    figure,
+    page,
+    panels,
+    section,
+    table,
+    tag,
+    tile,
+    write_page,
+)
+from calibrate.report.elements.svg import drawn, log_axis
+from calibrate.report.elements.tones import Tone
 
 CONTENTS = {"before": "Before", "left-out": "What the simulation lacks", "after": "After", "remains": "What remains"}
 SMALLEST_M = 1e-12  # of a row that a logarithmic axis can show

@@ -21,12 +21,12 @@ from numpy.typing import NDArray
 
 from acquisition.recording import Recording, Samples
 from acquisition.recording.samples import BAR, BAR_END, SEAT, cells_of, per_joint
-from calibrate.diagnose.compare.seated import is_seated
+from calibrate.apply.predicting import predict_with_physics
+from calibrate.compare.seated import is_seated
 from calibrate.errors import DataError
-from calibrate.model_file import ModelFile
-from calibrate.physics.predicting import predict_with_physics
-from calibrate.predict import Predictor
-from calibrate.sensors.catalogue import SENSORS
+from calibrate.model.model_file import ModelFile
+from calibrate.model.predict import Predictor
+from calibrate.model.sensors.catalogue import SENSORS
 
 Floats = NDArray[np.float64]
 

@@ -1,7 +1,7 @@
 """What a session's samples determine so far, and how many more of its poses make it accurate enough.
 
 The error is that of the beam over the workspace, as the covariance of the fit so far predicts it: the same fit, noise
-and target as identification and pose design have (calibrate/identification, calibrate/pose_design), at the values and
+and target as identification and pose design have (calibrate/fit/identify, calibrate/design), at the values and
 under the noise found so far. For what these samples do not determine the reason is given instead of a number.
 
 Postures still to come are those of the nominal rig; a pose out of reach is left out here and reported by the drawing
@@ -25,18 +25,18 @@ from acquisition.recording.rig import Rig
 from acquisition.recording.samples import SPOTS, per_joint
 from acquisition.session.plan import Block, PoseKey
 from acquisition.session.records import Sample
-from calibrate.arms.catalogue import arm_of
-from calibrate.believed import BelievedRig
-from calibrate.fit import Status
-from calibrate.identifiability import Identifiability, analyse
-from calibrate.identification.rounds import Fitted, coarse_start, settled_fit
-from calibrate.identification.session import instruments_for_fit
-from calibrate.parameters import index_of, priors, start_values
-from calibrate.pose_design.candidates import Candidates
-from calibrate.pose_design.information import Information, target_of, with_prior
-from calibrate.read_samples import SIGMA_COLUMNS
-from calibrate.uncertainty.free_space import FELT_M
-from calibrate.variance import VarianceFactors
+from calibrate.design.candidates import Candidates
+from calibrate.design.information import Information, target_of, with_prior
+from calibrate.fit.accuracy.free_space import FELT_M
+from calibrate.fit.identify.rounds import Fitted, coarse_start, settled_fit
+from calibrate.fit.identify.session import instruments_for_fit
+from calibrate.fit.noise.variance import VarianceFactors
+from calibrate.fit.rank.identifiability import Identifiability, analyse
+from calibrate.fit.solvers import Status
+from calibrate.model.arms.catalogue import arm_of
+from calibrate.model.assumed_rig.assumed_rig import BelievedRig
+from calibrate.model.parameters import index_of, priors, start_values
+from calibrate.model.read_samples import SIGMA_COLUMNS
 
 Floats = NDArray[np.float64]
 

@@ -36,7 +36,7 @@ from calibeam.sessions.person import Person, devices_ready
 from calibeam.sessions.reporter import StatusReporter
 from calibeam.sessions.views import PageLines, PlainView
 from calibeam.site_log import SESSION_LOG, SITE_LOG
-from calibrate.arms.rig_arm import RigArm
+from calibrate.model.arms.rig_arm import RigArm
 from drivers.clock import Clock, SystemClock
 
 Floats = NDArray[np.float64]

@@ -12,8 +12,8 @@ from calibeam.simulation.physics import physics_of
 from calibeam.simulation.rig_in_numbers import arm_in_numbers, light_of, tracker_of
 from calibeam.simulation.scene_of_samples import rest_degC
 from calibrate.errors import DataError
-from calibrate.model_file import ModelFile
-from calibrate.predict import Predictor
+from calibrate.model.model_file import ModelFile
+from calibrate.model.predict import Predictor
 from simulators.arm.drawing import origin_and_rotation
 from simulators.defects import Defect
 from simulators.defects.defect import as_vector

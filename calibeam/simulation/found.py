@@ -8,15 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibeam.simulation.rig_in_numbers import arm_in_numbers, beyond_m, light_of
-from calibrate.diagnose.causes import cause
-from calibrate.effects.drivers import Drivers
-from calibrate.effects.gravity import likely_torque_nm
-from calibrate.effects.ports import Place, Port
-from calibrate.effects.second_encoders import AGAINST, PLACES
-from calibrate.effects.term import Accepted, Term
 from calibrate.errors import DataError
-from calibrate.physics.records import Effect
-from calibrate.predict import Predictor
+from calibrate.model.effect_records import Effect
+from calibrate.model.effects.causes import cause
+from calibrate.model.effects.drivers import Drivers
+from calibrate.model.effects.gravity import likely_torque_nm
+from calibrate.model.effects.ports import Place, Port
+from calibrate.model.effects.second_encoders import AGAINST, PLACES
+from calibrate.model.effects.term import Accepted, Term
+from calibrate.model.predict import Predictor
 from simulators.arm.kinematics import Arm, forward
 from simulators.arm.rigid import inverse
 from simulators.arm.statics import Load, weigh

@@ -14,14 +14,14 @@ import numpy as np
 
 from calibeam.simulation import of_arm, of_instruments
 from calibeam.simulation.found import FoundEffect
-from calibrate.effects.fixture_moved import ONE_BODY
-from calibrate.effects.ports import Place
-from calibrate.effects.psd_cover_glass import INDEX
-from calibrate.effects.second_encoders import AGAINST, PAST, SECOND
-from calibrate.effects.term import Shape
-from calibrate.effects.time_laws import BEHIND, FOR_A_WHILE
-from calibrate.sensors.catalogue import kind_of
-from calibrate.sensors.kind import Trait
+from calibrate.model.effects.fixture_moved import ONE_BODY
+from calibrate.model.effects.ports import Place
+from calibrate.model.effects.psd_cover_glass import INDEX
+from calibrate.model.effects.second_encoders import AGAINST, PAST, SECOND
+from calibrate.model.effects.term import Shape
+from calibrate.model.effects.time_laws import BEHIND, FOR_A_WHILE
+from calibrate.model.sensors.catalogue import kind_of
+from calibrate.model.sensors.kind import Trait
 from simulators.defects import Defect, base, detector, drive, encoder, fixture, found_curve, link, tool, tracker
 from simulators.replayed import Sited, Where
 

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from acquisition.recording import Samples
 from acquisition.recording.rig import Rig
 from acquisition.recording.samples import ORIENTATION, POSITION, SPOTS, WIRE, per_joint
-from calibrate.model_file import ModelFile
-from calibrate.sensors.camera import PLACE, TURN
+from calibrate.model.model_file import ModelFile
+from calibrate.model.sensors.camera import PLACE, TURN
 
 Floats = NDArray[np.float64]
 

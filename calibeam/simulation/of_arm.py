@@ -7,10 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibeam.simulation.found import FoundEffect
-from calibrate.effects.fixture_moved import CARRIED, ONE_BODY
-from calibrate.effects.hand_force import FORCE_N
-from calibrate.effects.term import Shape
-from calibrate.effects.time_laws import FOR_A_WHILE
+from calibrate.model.effects.fixture_moved import CARRIED, ONE_BODY
+from calibrate.model.effects.hand_force import FORCE_N
+from calibrate.model.effects.term import Shape
+from calibrate.model.effects.time_laws import FOR_A_WHILE
 from simulators.arm.rigid import Vector
 from simulators.arm.statics import Load, Weight, carried_by, loaded_by
 from simulators.defects import Defect

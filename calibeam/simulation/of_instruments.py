@@ -8,12 +8,12 @@ from numpy.typing import NDArray
 
 from calibeam.simulation.found import FoundEffect
 from calibeam.simulation.of_arm import course_of
-from calibrate.effects.laser_pointing import beam_axes
-from calibrate.effects.ports import Place
-from calibrate.effects.since_model import line_of
-from calibrate.effects.tool_sag import PAIRS
-from calibrate.sensors.catalogue import kind_of
-from calibrate.sensors.kind import Trait
+from calibrate.model.effects.laser_pointing import beam_axes
+from calibrate.model.effects.ports import Place
+from calibrate.model.effects.since_model import line_of
+from calibrate.model.effects.tool_sag import PAIRS
+from calibrate.model.sensors.catalogue import kind_of
+from calibrate.model.sensors.kind import Trait
 from simulators.arm.drawing import origin_and_rotation
 from simulators.arm.rigid import Vector
 from simulators.defects import Defect

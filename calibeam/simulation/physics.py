@@ -8,14 +8,14 @@ import numpy as np
 from calibeam.simulation.found import FoundEffect, FoundIn
 from calibeam.simulation.mechanism_table import NoMechanismError, at_the_end, mechanism_of
 from calibeam.simulation.rig_in_numbers import light_of
-from calibrate.effects.ports import Perturbation, Place
 from calibrate.errors import DataError
-from calibrate.model_file import ModelFile
-from calibrate.physics.acting import drivers_under, listed
-from calibrate.physics.applied import recorded_samples
-from calibrate.physics.records import Effect
-from calibrate.predict import Predictor
-from calibrate.sensors.catalogue import kind_of
+from calibrate.model.effect_records import Effect
+from calibrate.model.effects.ports import Perturbation, Place
+from calibrate.model.model_file import ModelFile
+from calibrate.model.predict import Predictor
+from calibrate.model.sensors.catalogue import kind_of
+from calibrate.model.with_effects.acting import drivers_under, listed
+from calibrate.model.with_effects.applied import recorded_samples
 from simulators.defects.detector import StrainedFace
 from simulators.defects.encoder import RADIUS_M, EccentricDisc
 from simulators.replayed import Sited

@@ -19,11 +19,11 @@ from calibeam.simulation.rig_in_numbers import rigged
 from calibeam.simulation.scene_of_samples import Clock, scene_of
 from calibeam.software import SOFTWARE
 from calibrate.errors import DataError
-from calibrate.model_file import ModelFile
-from calibrate.predict import Predictor
-from calibrate.sensors.camera import PLACE, TURN
-from calibrate.sensors.encoder_difference import differences
-from calibrate.sensors.full_pose import predicted_turns
+from calibrate.model.model_file import ModelFile
+from calibrate.model.predict import Predictor
+from calibrate.model.sensors.camera import PLACE, TURN
+from calibrate.model.sensors.encoder_difference import differences
+from calibrate.model.sensors.full_pose import predicted_turns
 from simulators.conceal.observe import shaken_rad
 from simulators.conceal.rig import Device, TrueRig
 from simulators.defects import Scene

@@ -14,14 +14,14 @@ from acquisition.recording import Samples
 from acquisition.recording.rig import Arm as RigArm
 from acquisition.recording.rig import ArmModel, Rig
 from acquisition.recording.samples import BAR, SEAT, TARGET
-from calibrate.arms.catalogue import arm_of
 from calibrate.errors import DataError
-from calibrate.predict import Predictor
-from calibrate.rigid import transform
-from calibrate.sensors.bar import bar_pairs
-from calibrate.sensors.device import AXES, Device
-from calibrate.sensors.position import seen_at
-from calibrate.sensors.spots import dual_psd_of
+from calibrate.model.arms.catalogue import arm_of
+from calibrate.model.placement.device import AXES, Device
+from calibrate.model.predict import Predictor
+from calibrate.model.rigid import transform
+from calibrate.model.sensors.bar import bar_pairs
+from calibrate.model.sensors.position import seen_at
+from calibrate.model.sensors.spots import dual_psd_of
 from simulators.arm.drawing import Drawing, Row, turning_com_m
 from simulators.arm.kinematics import Arm
 from simulators.arm.rigid import shifted

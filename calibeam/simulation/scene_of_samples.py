@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 
 from acquisition.recording import Samples
 from acquisition.recording.samples import SEAT
-from calibrate.effects.drivers import conditions_of, temperatures_of
-from calibrate.model_file import ModelFile
+from calibrate.model.effects.drivers import conditions_of, temperatures_of
+from calibrate.model.model_file import ModelFile
 from simulators.defects import Scene
 
 Floats = NDArray[np.float64]

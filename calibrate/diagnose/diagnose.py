@@ -10,17 +10,23 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from calibrate.diagnose.bench import recent_menu
-from calibrate.diagnose.diagnosis import Diagnosis, Finding, Named, Rejected, RivalName
-from calibrate.diagnose.doubt import Doubted, doubted
-from calibrate.diagnose.drifts import parted_by_time
-from calibrate.diagnose.findings import named
-from calibrate.diagnose.linearised import State
-from calibrate.diagnose.noise_law import noise_law
-from calibrate.diagnose.proof import floors, proofs
-from calibrate.diagnose.searching import Search
+from calibrate.diagnose.doubts.diagnosis import (
+    Diagnosis,
+    Finding,
+    Named,
+    Rejected,
+    RivalName,
+)
+from calibrate.diagnose.doubts.doubt import Doubted, doubted
+from calibrate.diagnose.doubts.drifts import parted_by_time
+from calibrate.diagnose.doubts.findings import named
+from calibrate.diagnose.doubts.proof import floors, proofs
+from calibrate.diagnose.search.bench import recent_menu
+from calibrate.diagnose.search.noise_law import noise_law
+from calibrate.diagnose.search.searching import Search
 from calibrate.diagnose.stages import Stage, Stages
-from calibrate.effects.term import Missing
+from calibrate.diagnose.state.linearised import State
+from calibrate.model.effects.term import Missing
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]

@@ -13,26 +13,37 @@ from scipy.stats import norm
 
 from acquisition.recording import Samples
 from acquisition.recording.rig import Rig
-from calibrate.blunders.finding import Blunder, BlunderKind
-from calibrate.blunders.same_posture import err_alike, postures
-from calibrate.diagnose.blunders_first import Cleared, blunders_first
 from calibrate.diagnose.diagnose import diagnose
-from calibrate.diagnose.diagnosis import Diagnosis, Unexplained, Verdict
-from calibrate.diagnose.doubt import records
-from calibrate.diagnose.drifts import doubtful
-from calibrate.diagnose.fitted import Fitted, fit_geometry
-from calibrate.diagnose.free_space_change import FreeSpaceChange, free_space_change
-from calibrate.diagnose.hidden_levers import TIME
-from calibrate.diagnose.session import Session, session_of
-from calibrate.diagnose.stages import DECIDING, Incomplete, Stage, Stages
-from calibrate.diagnose.stated_noise import NoiseFound, Statement, hidden_of, missing_words, noise_found
-from calibrate.diagnose.tail import LEAST
-from calibrate.diagnose.wild_rows import unexplained_rows
-from calibrate.effects.catalogue import missing_of
-from calibrate.effects.term import Missing
-from calibrate.identification.session import columns_of
-from calibrate.measured import Measured
-from calibrate.sensors.encoder_difference import NAME as ENCODER_DIFFERENCE
+from calibrate.diagnose.doubts.diagnosis import Diagnosis, Unexplained, Verdict
+from calibrate.diagnose.doubts.doubt import records
+from calibrate.diagnose.doubts.drifts import doubtful
+from calibrate.diagnose.doubts.free_space_change import FreeSpaceChange, free_space_change
+from calibrate.diagnose.doubts.hidden_levers import TIME
+from calibrate.diagnose.doubts.stated_noise import (
+    NoiseFound,
+    Statement,
+    hidden_of,
+    missing_words,
+    noise_found,
+)
+from calibrate.diagnose.gross_errors_first import Cleared, blunders_first
+from calibrate.diagnose.outlying_rows import unexplained_rows
+from calibrate.diagnose.search.tail import LEAST
+from calibrate.diagnose.stages import (
+    DECIDING,
+    Incomplete,
+    Stage,
+    Stages,
+)
+from calibrate.diagnose.state.fitted import Fitted, fit_geometry
+from calibrate.diagnose.state.session import Session, session_of
+from calibrate.fit.identify.session import columns_of
+from calibrate.model.checks.gross_error import Blunder, BlunderKind
+from calibrate.model.checks.same_posture import err_alike, postures
+from calibrate.model.effects.catalogue import missing_of
+from calibrate.model.effects.term import Missing
+from calibrate.model.measured import Measured
+from calibrate.model.sensors.encoder_difference import NAME as ENCODER_DIFFERENCE
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]

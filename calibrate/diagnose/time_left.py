@@ -12,10 +12,10 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from calibrate.diagnose.bench import Bench
-from calibrate.diagnose.linearised import Rows
-from calibrate.diagnose.noise_law import NoiseLaw, capture_orders, noise_law
-from calibrate.diagnose.tail import Tail
+from calibrate.diagnose.search.bench import Bench
+from calibrate.diagnose.search.noise_law import NoiseLaw, capture_orders, noise_law
+from calibrate.diagnose.search.tail import Tail
+from calibrate.diagnose.state.linearised import Rows
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]

@@ -37,7 +37,12 @@ from acquisition.recording.files.bounds import (
 )
 from acquisition.recording.rig import Rig
 from calibrate.error_simulation.machine import Machine, slot
-from calibrate.error_simulation.sources import Law, Source, Term, Wave
+from calibrate.error_simulation.sources import (
+    Law,
+    Source,
+    Term,
+    Wave,
+)
 from calibrate.errors import DataError
 
 SUFFIX = {"m": "_m", "rad": "_rad", "K": "_k"}

@@ -1,12 +1,12 @@
 """The arm whose errors are simulated, and the effect of drawn errors on its probe at a pose.
 
 Fixed parts with turns between them, and the probe behind the last one. Any serial arm is one
-(calibrate/arms/serial.py), so that a robot's D-H table and the local product of exponentials of an arm CMM are
+(calibrate/model/arms/serial.py), so that a robot's D-H table and the local product of exponentials of an arm CMM are
 perturbed in the same way: six errors behind every fixed part, one at every joint angle. Source: Huang Kui et al., error
 simulation of a flexible arm coordinate measuring machine, eq. 1 to 3.
 
 Slot 7 i + c (c = 0 ... 5) perturbs part i by a shift and a rotation vector in the frame behind it, slot 7 i + 6 adds to
-the angle of joint i + 1 (calibrate/arms/compiled.py). A column is what is drawn of an arm; at a pose a slot is a sum of
+the angle of joint i + 1 (model/arms/compiled.py). A column is what is drawn of an arm; at a pose a slot is a sum of
 columns by weights. A phased source has two columns, size times cosine and size times sine of its phase.
 """
 
@@ -19,12 +19,12 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from acquisition.recording.rig import Rig
-from calibrate.arms.compiled import PER_PART, perturbed_points
-from calibrate.arms.rig_arm import RigArm
-from calibrate.converted_rig import rig_of_model
 from calibrate.error_simulation.sources import Law, Source
-from calibrate.model_file import ModelFile
-from calibrate.rigid import cross
+from calibrate.model.arms.compiled import PER_PART, perturbed_points
+from calibrate.model.arms.rig_arm import RigArm
+from calibrate.model.converted_rig import rig_of_model
+from calibrate.model.model_file import ModelFile
+from calibrate.model.rigid import cross
 
 Floats = NDArray[np.float64]
 
@@ -36,7 +36,7 @@ class Machine(RigArm):
     name: str
 
     def by_slot(self, q_rad: Floats) -> Floats:
-        """(pose, 3, slot) derivative of the probe by every slot (calibrate/arms/compiled.py), at no error.
+        """(pose, 3, slot) derivative of the probe by every slot (calibrate/model/arms/compiled.py), at no error.
 
         Shift c of part i moves it by the axis c of B_i, turn c by that axis x (p - o); an angle is a turn about z.
         """

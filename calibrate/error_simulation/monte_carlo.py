@@ -12,7 +12,13 @@ from itertools import islice
 import numpy as np
 from numpy.typing import NDArray
 
-from calibrate.error_simulation.machine import ArmAtPoses, Columns, Machine, arm_at, columns_of
+from calibrate.error_simulation.machine import (
+    ArmAtPoses,
+    Columns,
+    Machine,
+    arm_at,
+    columns_of,
+)
 from calibrate.error_simulation.sources import Source
 
 Floats = NDArray[np.float64]

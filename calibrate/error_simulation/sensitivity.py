@@ -21,7 +21,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import qmc, sobol_indices
 
-from calibrate.error_simulation.machine import ArmAtPoses, Columns, Machine, arm_at, columns_of, probe_errors
+from calibrate.error_simulation.machine import (
+    ArmAtPoses,
+    Columns,
+    Machine,
+    arm_at,
+    columns_of,
+    probe_errors,
+)
 from calibrate.error_simulation.sources import Source
 
 Floats = NDArray[np.float64]

@@ -17,17 +17,17 @@ from acquisition.recording import Samples
 from acquisition.recording.pose_plan import PosePlan
 from acquisition.recording.rig import Rig
 from acquisition.recording.samples import ORIENTATION, POSITION
-from calibrate.alignment import rigid_motion
-from calibrate.arms.rig_arm import RigArm
-from calibrate.correct.corrected import Arms, Options
-from calibrate.effects.drivers import moves_of
+from calibrate.apply.correct.corrected import Arms, Options
+from calibrate.apply.predicting import Placed, placed
 from calibrate.errors import DataError
+from calibrate.fit.held_out.splits import CLOSE_RAD, same_poses
 from calibrate.iso9283.performance import AttainedPoses, PoseTest, performance_of
-from calibrate.model_file import ModelFile
-from calibrate.physics.predicting import Placed, placed
-from calibrate.predict import Predictor
-from calibrate.rigid import inverse, transform
-from calibrate.uncertainty.splits import CLOSE_RAD, same_poses
+from calibrate.model.alignment import rigid_motion
+from calibrate.model.arms.rig_arm import RigArm
+from calibrate.model.effects.drivers import moves_of
+from calibrate.model.model_file import ModelFile
+from calibrate.model.predict import Predictor
+from calibrate.model.rigid import inverse, transform
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -14,10 +14,19 @@ from matplotlib.ticker import MaxNLocator
 from calibrate.error_simulation.monte_carlo import BINS
 from calibrate.error_simulation.sensitivity import ROUNDING_M, Single
 from calibrate.error_simulation.simulate import SHARE, Simulation
-from calibrate.report.elements import Html, figure, page, section, table, tag, tile, write_page
-from calibrate.report.quantities import angle, length, significant
-from calibrate.report.svg import drawn, log_axis
-from calibrate.report.tones import PLACES, Tone
+from calibrate.quantities import angle, length, significant
+from calibrate.report.elements.html import (
+    Html,
+    figure,
+    page,
+    section,
+    table,
+    tag,
+    tile,
+    write_page,
+)
+from calibrate.report.elements.svg import drawn, log_axis
+from calibrate.report.elements.tones import PLACES, Tone
 
 SCALES = {"m": (1e3, "mm"), "rad": (1e3, "mrad"), "K": (1.0, "K")}
 STYLES = {"-": "solid", "--": "dashed", ":": "dotted"}

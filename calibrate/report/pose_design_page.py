@@ -7,15 +7,25 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from acquisition.recording.rig import Rig
-from calibrate.diagnose.diagnosis import Named
-from calibrate.pose_design.design import Design
-from calibrate.pose_design.places import Places
-from calibrate.pose_design.seen import Seen
+from calibrate.design.design import Design
+from calibrate.design.places import Places
+from calibrate.design.seen import Seen
+from calibrate.diagnose.doubts.diagnosis import Named
+from calibrate.quantities import length
 from calibrate.report.diagnosis.words import size_of
-from calibrate.report.elements import Html, bullets, figure, page, section, table, tag, tile, write_page
-from calibrate.report.quantities import length
-from calibrate.report.svg import drawn, log_axis
-from calibrate.report.tones import PLACES, Tone
+from calibrate.report.elements.html import (
+    Html,
+    bullets,
+    figure,
+    page,
+    section,
+    table,
+    tag,
+    tile,
+    write_page,
+)
+from calibrate.report.elements.svg import drawn, log_axis
+from calibrate.report.elements.tones import PLACES, Tone
 
 SHOWN_MM = 1.0  # of the curve: beyond, there are fewer readings than unknowns, and priors alone speak
 

@@ -3,16 +3,23 @@
 from collections.abc import Iterator
 from dataclasses import replace
 
-from calibrate.diagnose.schema import DiagnosisFile
-from calibrate.report import elements, session_workspace
+from calibrate.diagnose.record.schema import DiagnosisFile
 from calibrate.report.diagnosis.diagnosis_page import beyond_model, inserted
 from calibrate.report.drift.drift_chapter import TITLE as DRIFT
 from calibrate.report.drift.drift_chapter import drift_chapter, sentence
 from calibrate.report.drift.two_calibrations import Drift
-from calibrate.report.elements import Html, page, section, tag
-from calibrate.report.interactive.plots import INTERACTIVE_TITLE as INTERACTIVE
-from calibrate.report.interactive.plots import interactive_chapter
-from calibrate.report.interactive.session_figures import session_figures
+from calibrate.report.elements import html as elements
+from calibrate.report.elements.html import (
+    Html,
+    page,
+    section,
+    tag,
+)
+from calibrate.report.elements.verdict import Answers
+from calibrate.report.evidence.session_evidence import SessionEvidence, spot_session
+from calibrate.report.figures.plots import INTERACTIVE_TITLE as INTERACTIVE
+from calibrate.report.figures.plots import interactive_chapter
+from calibrate.report.figures.session_figures import session_figures
 from calibrate.report.sections import (
     arm_errors,
     centring,
@@ -25,9 +32,8 @@ from calibrate.report.sections import (
 )
 from calibrate.report.sections.summary import when
 from calibrate.report.sections.zeros import ZEROS, zeros_part
-from calibrate.report.session_evidence import SessionEvidence, spot_session
-from calibrate.report.session_workspace import NOT_IN_SPACE, session_measured
-from calibrate.report.verdict import Answers
+from calibrate.report.workspace import session_workspace
+from calibrate.report.workspace.session_workspace import NOT_IN_SPACE, session_measured
 from calibrate.report.workspace.workspace_errors import Room, session_arm, session_room
 
 

@@ -6,14 +6,30 @@ import numpy as np
 from matplotlib.figure import Figure as Drawing
 
 from acquisition.recording import Recording
-from calibrate.report import elements
-from calibrate.report.elements import Html, bullets, figure, page, panels, section, table, tag, tile, write_page
-from calibrate.report.quantities import DASH, fixed, length, significant
-from calibrate.report.svg import drawn
-from calibrate.report.tones import PLACES, Tone
-from calibrate.report.verdict import Trust
-from calibrate.verification.measured_lengths import Figure, Judgement
-from calibrate.verification.verify import Verification
+from calibrate.quantities import (
+    DASH,
+    fixed,
+    length,
+    significant,
+)
+from calibrate.report.elements import html as elements
+from calibrate.report.elements.html import (
+    Html,
+    bullets,
+    figure,
+    page,
+    panels,
+    section,
+    table,
+    tag,
+    tile,
+    write_page,
+)
+from calibrate.report.elements.svg import drawn
+from calibrate.report.elements.tones import PLACES, Tone
+from calibrate.report.elements.verdict import Trust
+from calibrate.verify.measured_lengths import Figure, Judgement
+from calibrate.verify.verify import Verification
 
 CONTENTS = {
     "figures": "Figures of the standards",

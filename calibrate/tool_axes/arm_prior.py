@@ -9,12 +9,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from calibrate.arms.belief import LinkBelief
-from calibrate.arms.model import KinematicModel
 from calibrate.errors import DataError
-from calibrate.model_file import ModelFile
-from calibrate.parameters import Parameter, index_of, start_values
-from calibrate.problem import whitener_of
+from calibrate.model.arms.link_tolerance import LinkBelief
+from calibrate.model.kinematic_model import KinematicModel
+from calibrate.model.model_file import ModelFile
+from calibrate.model.parameters import Parameter, index_of, start_values
+from calibrate.model.problem import whitener_of
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]

@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibrate.errors import DataError
-from calibrate.fit import Status, solve
-from calibrate.identifiability import analyse
-from calibrate.parameters import Parameter
-from calibrate.rigid import cross
+from calibrate.fit.rank.identifiability import analyse
+from calibrate.fit.solvers import Status, solve
+from calibrate.model.parameters import Parameter
+from calibrate.model.rigid import cross
 
 Floats = NDArray[np.float64]
 

@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from calibrate.chain import Chain
-from calibrate.rigid import cross, inverse
-from calibrate.sensors.device import Device
-from calibrate.sensors.position import Position
-from calibrate.sensors.target import Target
+from calibrate.model.chain import Chain
+from calibrate.model.placement.device import Device
+from calibrate.model.placement.target import Target
+from calibrate.model.rigid import cross, inverse
+from calibrate.model.sensors.position import Position
 from calibrate.tool_axes.wrist_fit import TargetRows, WristFit, target_names
 
 Floats = NDArray[np.float64]

@@ -14,12 +14,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from calibrate.arms.model import KinematicModel
 from calibrate.errors import DataError
-from calibrate.fit import Status
-from calibrate.identifiability import analyse
-from calibrate.parameters import hold
-from calibrate.rigid import cross, inverse
+from calibrate.fit.rank.identifiability import analyse
+from calibrate.fit.solvers import Status
+from calibrate.model.kinematic_model import KinematicModel
+from calibrate.model.parameters import hold
+from calibrate.model.rigid import cross, inverse
 from calibrate.tool_axes.arm_prior import ArmPrior
 from calibrate.tool_axes.circle import (
     SHORTEST_RAD,
@@ -30,7 +30,12 @@ from calibrate.tool_axes.circle import (
     single_axis_segments,
     wrist,
 )
-from calibrate.tool_axes.orientation import FlangeSeen, Orientation, flange_seen, orientation_of
+from calibrate.tool_axes.orientation import (
+    FlangeSeen,
+    Orientation,
+    flange_seen,
+    orientation_of,
+)
 from calibrate.tool_axes.wrist_fit import (
     Noise,
     TargetRows,

@@ -9,7 +9,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from calibrate.model_file import RigIdentity
+from calibrate.model.model_file import RigIdentity
 from calibrate.tool_axes.arm_prior import ArmErrors
 from calibrate.tool_axes.circle import AxisFound
 from calibrate.tool_axes.orientation import FlangeSeen, Orientation

@@ -18,17 +18,23 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 from scipy.stats import chi2
 
-from calibrate.arms.model import KinematicModel
-from calibrate.chain import Chain
-from calibrate.fit import FAR_START, NEAR_START, Fit, covariance_of, solve
-from calibrate.joint_problem import JointProblem
-from calibrate.parameters import Parameter, index_of, start_values
-from calibrate.problem import Problem
-from calibrate.rigid import inverse
-from calibrate.sensors.device import Device
-from calibrate.sensors.full_pose import FullPose
-from calibrate.sensors.position import Position
-from calibrate.sensors.target import UNKNOWN_PLAUSIBLE_M, Target
+from calibrate.fit.joint_problem import JointProblem
+from calibrate.fit.solvers import (
+    FAR_START,
+    NEAR_START,
+    Fit,
+    covariance_of,
+    solve,
+)
+from calibrate.model.chain import Chain
+from calibrate.model.kinematic_model import KinematicModel
+from calibrate.model.parameters import Parameter, index_of, start_values
+from calibrate.model.placement.device import Device
+from calibrate.model.placement.target import UNKNOWN_PLAUSIBLE_M, Target
+from calibrate.model.problem import Problem
+from calibrate.model.rigid import inverse
+from calibrate.model.sensors.full_pose import FullPose
+from calibrate.model.sensors.position import Position
 from calibrate.tool_axes.arm_prior import ArmPrior, PriorRows, free_parameters
 
 Floats = NDArray[np.float64]

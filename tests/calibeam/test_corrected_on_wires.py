@@ -22,8 +22,8 @@ from acquisition.recording.rig import parse_rig
 from acquisition.recording.session_folder import write_csv
 from calibeam.cli import run
 from calibeam.simulation.mechanism_by_hand import by_hand
-from calibrate.alignment import aligned_difference
-from calibrate.arms.rig_arm import RigArm
+from calibrate.model.alignment import aligned_difference
+from calibrate.model.arms.rig_arm import RigArm
 from drivers.ur.control import UrControl
 from simulators.world.world import World
 from tests.support.direct_bench import DirectBench

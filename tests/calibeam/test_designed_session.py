@@ -12,7 +12,7 @@ from acquisition.session.plan import PlanOptions
 from calibeam.devices.recorder import record_session
 from calibeam.motion.reachable_poses import candidates_of
 from calibeam.printing.progress import progress_bar
-from calibrate.pose_design.candidates import blocks_of, plan_of, taken
+from calibrate.design.candidates import blocks_of, plan_of, taken
 from drivers.clock import SystemClock
 from tests.support.direct_bench import direct_bench
 

@@ -6,10 +6,16 @@ import msgspec
 import pytest
 
 from calibeam.cli import run
-from calibrate.diagnose.file import read_diagnosis
-from calibrate.diagnose.schema import CurveRecord, DiagnosisFile, FindingRecord
+from calibrate.diagnose.record.file import read_diagnosis
+from calibrate.diagnose.record.schema import CurveRecord, DiagnosisFile, FindingRecord
 from calibrate.errors import DataError
-from calibrate.model_file import Covariance, ModelFile, ModelParameter, RigIdentity, read_model
+from calibrate.model.model_file import (
+    Covariance,
+    ModelFile,
+    ModelParameter,
+    RigIdentity,
+    read_model,
+)
 
 MODEL = ModelFile(
     schema=1,

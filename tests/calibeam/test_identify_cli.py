@@ -13,10 +13,10 @@ from scipy.spatial.transform import Rotation
 
 from acquisition.recording import read
 from calibeam.cli import run
-from calibrate.fit import solve
-from calibrate.model_file import read_model
-from calibrate.report.session_evidence import session_evidence
-from calibrate.report.session_verdict import session_verdict
+from calibrate.fit.solvers import solve
+from calibrate.model.model_file import read_model
+from calibrate.report.evidence.session_evidence import session_evidence
+from calibrate.report.evidence.session_verdict import session_verdict
 
 RIG = """schema = 1
 name = "three-joints"
@@ -257,7 +257,7 @@ def test_every_way_to_read_positions_ends_with_a_verdict(folder, tmp_path, capsy
 
 def test_a_fit_that_came_to_no_end_is_partial_and_its_model_is_kept(folder, tmp_path, capsys, monkeypatch):
     model = tmp_path / "model.json"
-    monkeypatch.setattr("calibrate.estimator.solve", partial(solve, max_steps=0))
+    monkeypatch.setattr("calibrate.fit.estimator.solve", partial(solve, max_steps=0))
     assert run(["identify", str(folder), "--out", str(model)]) == 3
     told = capsys.readouterr()
     assert "No usable model: step limit reached" in " ".join(told.out.split())
@@ -270,7 +270,7 @@ def test_a_refit_that_came_to_no_end_is_partial_and_its_model_is_kept(identified
     refit = ["identify", str(identified[0] / "session"), "--model", str(known), "--out", str(model)]
     assert run(refit) == 0
     assert read_model(model).status == read_model(known).status == "RANK_DEFICIENT"
-    monkeypatch.setattr("calibrate.diagnose.fitted.TURNS", 2)
+    monkeypatch.setattr("calibrate.diagnose.state.fitted.TURNS", 2)
     capsys.readouterr()
     assert run(refit) == 3
     said = f"kmax of [dog-leg] in the fit plan; what was found so far is in {model}"

@@ -14,8 +14,8 @@ from scipy.spatial.transform import Rotation
 
 from acquisition.recording import read
 from calibeam.cli import run
-from calibrate.diagnose.compare.streams import late_against_joints, stream_pairs
-from calibrate.diagnose.file import read_diagnosis
+from calibrate.compare.streams import late_against_joints, stream_pairs
+from calibrate.diagnose.record.file import read_diagnosis
 from calibrate.diagnose.streams.examine import examine
 from calibrate.diagnose.streams.recorded import devices_of
 from simulators.streams.course import course

@@ -7,7 +7,7 @@ import pytest
 
 from calibeam.cli import run
 from calibeam.devices.site import check_session
-from calibrate.model_file import read_model
+from calibrate.model.model_file import read_model
 from simulators.conceal.case import conceal
 from simulators.conceal.case_files import write_case
 from simulators.conceal.wanted import Wanted

@@ -9,7 +9,7 @@ import pyarrow.parquet
 import pytest
 
 from calibeam.cli import run
-from calibrate.model_file import ModelFile, RigIdentity, write_model
+from calibrate.model.model_file import ModelFile, RigIdentity, write_model
 
 RIG = """schema = 1
 name = "two-joints"

@@ -9,7 +9,7 @@ import pytest
 from acquisition.recording.rig import load_rig
 from calibeam.cli import run
 from calibeam.commands.rig import shipped_rigs
-from calibrate.arms.rig_arm import RigArm
+from calibrate.model.arms.rig_arm import RigArm
 
 URDF = """<robot name="r"><link name="a"/><link name="b"/><joint name="j" type="revolute"><parent link="a"/>
 <child link="b"/><axis xyz="0 1 0"/><limit lower="-1" upper="1"/></joint></robot>"""

@@ -11,10 +11,10 @@ from acquisition.recording import Samples
 from calibeam.printing.identification import print_identification
 from calibeam.results.identification import Planned, identify_session, session_model
 from calibrate.errors import DataError
-from calibrate.fit_plan import parse_plan
-from calibrate.identification.point_constraint import point_constraints
-from calibrate.report.session_evidence import session_evidence
-from calibrate.report.session_verdict import session_verdict
+from calibrate.fit.fit_plan import parse_plan
+from calibrate.fit.identify.point_constraint import point_constraints
+from calibrate.report.evidence.session_evidence import session_evidence
+from calibrate.report.evidence.session_verdict import session_verdict
 from tests.support.recorded_session import recorded_session
 
 RIG = Path(__file__).parents[2] / "rigs" / "ur5e-dual-psd.toml"

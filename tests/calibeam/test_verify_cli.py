@@ -11,9 +11,9 @@ from acquisition.recording import read, readings_sha256
 from acquisition.recording.rig import load_rig, rig_sha256, rig_text
 from calibeam.cli import run
 from calibeam.guided.recorded import BelievedGuidedArm
-from calibrate.arms.catalogue import arm_of
-from calibrate.arms.eccentric import with_discs
-from calibrate.model_file import ModelFile, RigIdentity, write_model
+from calibrate.model.arms.catalogue import arm_of
+from calibrate.model.arms.eccentric import with_discs
+from calibrate.model.model_file import ModelFile, RigIdentity, write_model
 
 RIG_FILE = Path(__file__).parents[2] / "rigs" / "arm-cmm-reference.toml"
 RIG = load_rig(RIG_FILE)

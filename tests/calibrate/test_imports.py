@@ -11,21 +11,24 @@ SLOW = ("scipy.stats", "scipy.optimize", "scipy.interpolate", "scipy.ndimage", "
 # stages before and after the fit, loaded by their command
 LATER = (
     "calibrate.report",
-    "calibrate.correct",
+    "calibrate.apply.correct",
+    "calibrate.apply.programs",
     "calibrate.diagnose",
-    "calibrate.effects",
-    "calibrate.export.not_carried",  # of a model with effects
-    "calibrate.physics",
+    "calibrate.model.effects",
+    "calibrate.apply.export.not_carried",  # of a model with effects
+    "calibrate.model.with_effects",
+    "calibrate.apply.predicting",
+    "calibrate.compare",
     "calibrate.error_simulation",
     "calibrate.iso9283",
-    "calibrate.pose_design",
+    "calibrate.design",
     "calibrate.tool_axes",
-    "calibrate.verification",
+    "calibrate.verify",
 )
 MOST_MODULES = 850  # 692 with CPython 3.11, of which 144 are numpy and 175 scipy; scipy.stats alone would add 300
 PROGRAM = """
 import pkgutil, sys, importlib, calibrate
-COMPILED = ("calibrate.arms.fast",)
+COMPILED = ("calibrate.model.arms.fast",)
 names = [module.name for module in pkgutil.walk_packages(calibrate.__path__, "calibrate.")]
 for later in (tuple(sys.argv[1:]), ("calibrate.report",)):
     for name in names:
@@ -49,6 +52,6 @@ def test_calibrate_loads_no_port_library(loaded):
 
 def test_no_slow_library_is_loaded_before_it_is_needed(loaded):
     loaded, _ = loaded
-    assert "calibrate.identification.identify" in loaded
+    assert "calibrate.fit.identify.identify" in loaded
     assert not set(SLOW) & loaded
     assert len(loaded) <= MOST_MODULES

@@ -20,6 +20,6 @@ def test_every_room_of_the_program_is_in_the_map():
 
 def test_files_of_the_walk_through_a_diagnosis_stand_in_its_folder():
     walk = PAGE[PAGE.index("**diagnose.**") : PAGE.index("| where is")]
-    short = re.findall(r"`(\w+\.py)`", walk)
+    short = re.findall(r"`((?:\w+/)?\w+\.py)`", walk)
     assert len(short) >= 10
     assert not [name for name in short if not (ROOT / "calibrate" / "diagnose" / name).exists()]

@@ -13,10 +13,10 @@ from scipy.spatial.transform import Rotation
 from acquisition.recording import read
 from calibeam.cli import run
 from calibeam.results.diagnosis import diagnose_to_file
-from calibrate.diagnose import to_file
-from calibrate.effects import catalogue
-from calibrate.effects.term import UNITS
-from calibrate.model_file import read_model
+from calibrate.diagnose.record import to_file
+from calibrate.model.effects import catalogue
+from calibrate.model.effects.term import UNITS
+from calibrate.model.model_file import read_model
 from drivers.errors import DeviceLost, DeviceStale, WireError
 from drivers.transports.serial_port import SerialAddress, open_serial
 from simulators.conceal.case import conceal

@@ -19,12 +19,17 @@ from acquisition.recording.rig import parse_rig, rig_text
 from acquisition.recording.session_folder import write_csv
 from calibeam.devices.check import check_devices
 from calibeam.devices.others import DeviceKind, emulated_others, other_drivers
-from calibrate.arms.rig_arm import RigArm
-from calibrate.effects.kind import Kind
+from calibrate.apply.export.export import FORMS, FormName, form_named
 from calibrate.errors import DataError
-from calibrate.export.export import FORMS, FormName, form_named
-from calibrate.model_file import read_model
-from calibrate.plug_ins import DEVICES, EFFECTS, loaded, plug_ins
+from calibrate.model.arms.rig_arm import RigArm
+from calibrate.model.effects.kind import Kind
+from calibrate.model.model_file import read_model
+from calibrate.plug_ins import (
+    DEVICES,
+    EFFECTS,
+    loaded,
+    plug_ins,
+)
 from drivers.clock import SystemClock
 from drivers.errors import DeviceRefused
 from simulators.devices import plug_in_bench
@@ -121,7 +126,7 @@ def test_its_driver_reads_its_emulator(installed: Path) -> None:
 
 
 def test_its_effect_is_in_the_catalogue_of_a_fresh_interpreter(installed: Path) -> None:
-    says = "from calibrate.effects.catalogue import EFFECTS; print(EFFECTS[-1].physics)"
+    says = "from calibrate.model.effects.catalogue import EFFECTS; print(EFFECTS[-1].physics)"
     assert in_a_fresh_interpreter(installed, says).strip() == "balancer-pull"
 
 
@@ -250,7 +255,7 @@ def test_a_broken_package_is_named_once_and_left_out(site_packages: Path, capsys
     assert loaded("calibeam.test-effects", Kind) == loaded("calibeam.test-effects", Kind) == ()
     broken, wrong = capsys.readouterr().err.splitlines()
     assert "'broken' (calibeam.test-effects) of the package broken-lab 0.3 cannot be loaded: ModuleNotFound" in broken
-    assert "wrong_lab:KIND is a int, not a calibrate.effects.kind.Kind; it is left out" in wrong
+    assert "wrong_lab:KIND is a int, not a calibrate.model.effects.kind.Kind; it is left out" in wrong
     rig = parse_rig(RIG + OTHER, "rig.toml")  # a rig that names it is read, and whoever needs it is told
     with pytest.raises(DeviceRefused, match=r"hall: plug-in 'lab-thermometer' .* package broken-lab 0.3 cannot be loa"):
         other_drivers(rig.devices.others, SystemClock())

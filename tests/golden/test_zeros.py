@@ -6,7 +6,7 @@ from . import answers
 from .agreement import VALUE_SIGMAS, parameter_differences
 
 UNSEEN = {"joint1.zero", "joint6.zero"}  # each only together with a place or with the laser's mount
-DAILY = ("00", "03")  # more drawn truths: tests/calibrate/identification/test_joint_zeros.py
+DAILY = ("00", "03")  # more drawn truths: tests/calibrate/fit/identify/test_joint_zeros.py
 
 
 def marked(name):

@@ -10,13 +10,13 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from calibrate.diagnose.extended import carried_over, extended
-from calibrate.diagnose.fitted import Fitted
-from calibrate.diagnose.null import is_slow
-from calibrate.diagnose.ported import perturbed_frames
-from calibrate.effects.gravity import likely_torque_nm
-from calibrate.effects.ports import Perturbation
-from calibrate.sensors.encoder_difference import NAME as ENCODER_DIFFERENCE
+from calibrate.diagnose.search.null import is_slow
+from calibrate.diagnose.state.fitted import Fitted
+from calibrate.model.effects.gravity import likely_torque_nm
+from calibrate.model.effects.ports import Perturbation
+from calibrate.model.sensors.encoder_difference import NAME as ENCODER_DIFFERENCE
+from calibrate.model.with_effects.new_poses import carried_over, extended
+from calibrate.model.with_effects.ported_chain import perturbed_frames
 
 Floats = NDArray[np.float64]
 Causes = Callable[[int, Floats], Floats]  # joint (from 1) and poses (stand, joint) to columns (stand, m)

@@ -12,15 +12,7 @@ from calibrate.diagnose.streams.clock_steps import judged, shares_host_clock
 from calibrate.diagnose.streams.coarse_clock import Ticks
 from calibrate.diagnose.streams.continuity import Fault, breaks
 from calibrate.diagnose.streams.finding import Outcome, StreamFinding
-from calibrate.diagnose.streams.following import SMALLEST_S, Following, following
-from calibrate.diagnose.streams.lateness import lateness
-from calibrate.diagnose.streams.recorded import Device, start_between
-from calibrate.diagnose.streams.ringing import Levers, ringing
-from calibrate.diagnose.streams.sample_times import by_host
-from calibrate.diagnose.streams.settling import Window, unsettled
-from calibrate.diagnose.streams.slips import slips
-from calibrate.diagnose.streams.stands import Stand, stands_of
-from calibrate.diagnose.streams.told import (
+from calibrate.diagnose.streams.findings_of import (
     told_breaks,
     told_following,
     told_late,
@@ -29,6 +21,14 @@ from calibrate.diagnose.streams.told import (
     told_slip,
     told_unsettled,
 )
+from calibrate.diagnose.streams.following import SMALLEST_S, Following, following
+from calibrate.diagnose.streams.lateness import lateness
+from calibrate.diagnose.streams.recorded import Device, start_between
+from calibrate.diagnose.streams.ringing import Levers, ringing
+from calibrate.diagnose.streams.sample_times import by_host
+from calibrate.diagnose.streams.settling import Window, unsettled
+from calibrate.diagnose.streams.slips import slips
+from calibrate.diagnose.streams.stands import Stand, stands_of
 from calibrate.diagnose.streams.track import SIGMA_OF_MEDIAN, Track
 
 Floats = NDArray[np.float64]

@@ -4,8 +4,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum
 
-from calibrate.diagnose.diagnosis import Named
-from calibrate.effects.term import Size
+from calibrate.diagnose.doubts.diagnosis import Named
+from calibrate.model.effects.term import Size
 
 
 class Outcome(Enum):

@@ -7,12 +7,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.recording import Recording
-from calibrate.diagnose.fitted import Fitted
+from calibrate.diagnose.state.fitted import Fitted
 from calibrate.diagnose.streams.between_encoders import causes_of
 from calibrate.diagnose.streams.examine import Predicted, StreamReport, examine
 from calibrate.diagnose.streams.recorded import devices_of
 from calibrate.diagnose.streams.sample_times import Around, around, sample_windows
-from calibrate.predict import Predictor
+from calibrate.model.predict import Predictor
 
 Floats = NDArray[np.float64]
 

@@ -8,8 +8,15 @@ import math
 
 from msgspec.structs import replace
 
-from calibrate.diagnose.diagnosis import NAMED, Named, Verdict
-from calibrate.diagnose.schema import ClockRecord, DiagnosisFile, FindingRecord, RivalRecord, SizeRecord, StreamsRecord
+from calibrate.diagnose.doubts.diagnosis import NAMED, Named, Verdict
+from calibrate.diagnose.record.schema import (
+    ClockRecord,
+    DiagnosisFile,
+    FindingRecord,
+    RivalRecord,
+    SizeRecord,
+    StreamsRecord,
+)
 from calibrate.diagnose.streams.clock import ClockFit
 from calibrate.diagnose.streams.examine import StreamReport
 from calibrate.diagnose.streams.finding import StreamFinding

@@ -12,14 +12,20 @@ import msgspec
 
 from acquisition.recording import Recording
 from acquisition.recording.rig import Rig
-from calibrate.arms.eccentric import COSINE, SINE
-from calibrate.diagnose.schema import DiagnosisFile, FindingRecord
+from calibrate.diagnose.record.schema import DiagnosisFile, FindingRecord
 from calibrate.errors import DataError
-from calibrate.model_file import ModelFile
+from calibrate.model.arms.eccentric import COSINE, SINE
+from calibrate.model.model_file import ModelFile
 from calibrate.report.diagnosis import overview
 from calibrate.report.diagnosis.finding_page import chain_of, finding_page, title_of
-from calibrate.report.elements import PROVENANCE_TITLE as PROVENANCE
-from calibrate.report.elements import Html, page, provenance, tag, write_page
+from calibrate.report.elements.html import PROVENANCE_TITLE as PROVENANCE
+from calibrate.report.elements.html import (
+    Html,
+    page,
+    provenance,
+    tag,
+    write_page,
+)
 
 DISC = "encoder-eccentricity"
 

@@ -7,15 +7,35 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from calibrate.diagnose.schema import CurveRecord, DiagnosisFile, FindingRecord, RivalRecord, SizeRecord
+from calibrate.diagnose.record.schema import (
+    CurveRecord,
+    DiagnosisFile,
+    FindingRecord,
+    RivalRecord,
+    SizeRecord,
+)
+from calibrate.model.sensors.catalogue import kind_of
+from calibrate.model.sensors.kind import Trait
+from calibrate.quantities import (
+    DASH,
+    TIED,
+    decimals_of,
+    fixed,
+    significant,
+)
 from calibrate.report.diagnosis.words import place_words, unit_of
-from calibrate.report.elements import Html, facts, figure, panels, section, table, tag
-from calibrate.report.error_figures import thinned
-from calibrate.report.quantities import DASH, TIED, decimals_of, fixed, significant
-from calibrate.report.svg import POINT_PX, drawn
-from calibrate.report.tones import Tone
-from calibrate.sensors.catalogue import kind_of
-from calibrate.sensors.kind import Trait
+from calibrate.report.elements.html import (
+    Html,
+    facts,
+    figure,
+    panels,
+    section,
+    table,
+    tag,
+)
+from calibrate.report.elements.svg import POINT_PX, drawn
+from calibrate.report.elements.tones import Tone
+from calibrate.report.figures.error_figures import thinned
 
 
 @dataclass(frozen=True)

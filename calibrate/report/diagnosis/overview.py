@@ -6,7 +6,14 @@ tested and rejected, what these poses cannot show, missing columns, faults of th
 
 from collections.abc import Iterator, Sequence
 
-from calibrate.diagnose.schema import DiagnosisFile, FindingRecord, NameRecord
+from calibrate.diagnose.record.schema import DiagnosisFile, FindingRecord, NameRecord
+from calibrate.quantities import (
+    DASH,
+    counted,
+    fixed,
+    length,
+    significant,
+)
 from calibrate.report.diagnosis.words import (
     SPLITS,
     confusable_causes,
@@ -18,9 +25,17 @@ from calibrate.report.diagnosis.words import (
     untested_physics,
     verdict_words,
 )
-from calibrate.report.elements import Html, bullets, folded, halves, section, table, tag, tile
-from calibrate.report.quantities import DASH, counted, fixed, length, significant
-from calibrate.report.verdict import Trust
+from calibrate.report.elements.html import (
+    Html,
+    bullets,
+    folded,
+    halves,
+    section,
+    table,
+    tag,
+    tile,
+)
+from calibrate.report.elements.verdict import Trust
 
 TITLE = "What the model lacks"
 TRUST = {"mismatch": Trust.CARE, "consistent": Trust.GOOD, "undecidable": Trust.NONE}

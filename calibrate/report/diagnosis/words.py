@@ -3,7 +3,8 @@
 import re
 from collections.abc import Iterator, Sequence
 
-from calibrate.diagnose.schema import (
+from calibrate.diagnose.doubts.stated_noise import Statement
+from calibrate.diagnose.record.schema import (
     ClockRecord,
     DiagnosisFile,
     FreeSpaceRecord,
@@ -13,9 +14,8 @@ from calibrate.diagnose.schema import (
     SplitRecord,
     UnexplainedRecord,
 )
-from calibrate.diagnose.stated_noise import Statement
-from calibrate.effects.term import UNITS
-from calibrate.report.quantities import TIED, counted, length
+from calibrate.model.effects.term import UNITS
+from calibrate.quantities import TIED, counted, length
 
 # Of streams, beside those of the catalogue; the first ending that fits is taken.
 OF_STREAMS = (("_s_per_s", 1e6, "µs per s"), ("_s2", 1e6, "ms²"), ("_hz", 1.0, "Hz"), ("_count", 1.0, ""))

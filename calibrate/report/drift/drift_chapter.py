@@ -5,14 +5,37 @@ from math import degrees
 
 import numpy as np
 
-from calibrate.diagnose.schema import DiagnosisFile, FindingRecord
-from calibrate.model_file import ModelFile
-from calibrate.report.drift.two_calibrations import FAMILY, Calibration, Change, Compared, Drift
-from calibrate.report.elements import Html, bullets, figure, folded, section, table, tag
-from calibrate.report.model_tests import proofs
-from calibrate.report.not_determined import in_plain_words
-from calibrate.report.quantities import DASH, aligned, angle, counted, decimals_of, fixed, length, significant
-from calibrate.report.verdict import coded
+from calibrate.diagnose.record.schema import DiagnosisFile, FindingRecord
+from calibrate.fit.rank.not_determined import in_plain_words
+from calibrate.model.model_file import ModelFile
+from calibrate.quantities import (
+    DASH,
+    aligned,
+    angle,
+    counted,
+    decimals_of,
+    fixed,
+    length,
+    significant,
+)
+from calibrate.report.drift.two_calibrations import (
+    FAMILY,
+    Calibration,
+    Change,
+    Compared,
+    Drift,
+)
+from calibrate.report.elements.html import (
+    Html,
+    bullets,
+    figure,
+    folded,
+    section,
+    table,
+    tag,
+)
+from calibrate.report.elements.verdict import coded
+from calibrate.report.evidence.model_tests import proofs
 from calibrate.report.workspace.cells import VIEWS, grid_of
 from calibrate.report.workspace.pictures import Layer, pictures
 

@@ -19,16 +19,21 @@ from scipy.stats import chi2, norm
 
 from acquisition.recording import Recording
 from acquisition.recording.rig import ArmModel, Joint, Rig, parse_rig
-from calibrate.converted_rig import rig_in_model
-from calibrate.diagnose.schema import DiagnosisFile
+from calibrate.diagnose.record.schema import DiagnosisFile
 from calibrate.errors import DataError
-from calibrate.model_file import Covariance, ModelFile, ModelParameter
-from calibrate.parameters import index_of
-from calibrate.report.model_tests import repeated, scatter
-from calibrate.report.verdict import UNLIKELY
-from calibrate.report.workspace.workspace_errors import KnownArm, Room, room_of, target_at
-from calibrate.uncertainty.fit_statistics import Alarm
-from calibrate.uncertainty.free_space import target_by_parameter
+from calibrate.fit.accuracy.fit_statistics import Alarm
+from calibrate.fit.accuracy.free_space import target_by_parameter
+from calibrate.model.converted_rig import rig_in_model
+from calibrate.model.model_file import Covariance, ModelFile, ModelParameter
+from calibrate.model.parameters import index_of
+from calibrate.report.elements.verdict import UNLIKELY
+from calibrate.report.evidence.model_tests import repeated, scatter
+from calibrate.report.workspace.workspace_errors import (
+    KnownArm,
+    Room,
+    room_of,
+    target_at,
+)
 
 BEHIND = (("offset", "d_m"), ("length", "a_m"), ("twist", "alpha_rad"))  # of the link behind a joint
 IN_FRONT = ("length", "twist")  # in a modified table these are of the link in front of it (arms/mdh.py)

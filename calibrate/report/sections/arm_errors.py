@@ -2,11 +2,26 @@
 
 import numpy as np
 
-from calibrate.report.elements import Html, figure, folded, panels, section, table, tag
-from calibrate.report.error_figures import MOST_POINTS, along, by_sample, errors, histogram, quantiles
-from calibrate.report.quantities import fixed, significant
-from calibrate.report.session_evidence import Readings, SessionEvidence
-from calibrate.report.session_verdict import GROUPS, Pattern, patterns_of
+from calibrate.quantities import fixed, significant
+from calibrate.report.elements.html import (
+    Html,
+    figure,
+    folded,
+    panels,
+    section,
+    table,
+    tag,
+)
+from calibrate.report.evidence.session_evidence import Readings, SessionEvidence
+from calibrate.report.evidence.session_verdict import GROUPS, Pattern, patterns_of
+from calibrate.report.figures.error_figures import (
+    MOST_POINTS,
+    along,
+    by_sample,
+    errors,
+    histogram,
+    quantiles,
+)
 
 TITLE = "Errors before and after"
 

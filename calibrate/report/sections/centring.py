@@ -12,11 +12,23 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from acquisition.recording import Event
-from calibrate.report.elements import Html, figure, panels, section, table, tag
-from calibrate.report.quantities import length, stated
-from calibrate.report.session_evidence import SpotSession
-from calibrate.report.svg import drawn, log_axis
-from calibrate.report.tones import Tone, colour_key, place_mark, tone_of
+from calibrate.quantities import length, stated
+from calibrate.report.elements.html import (
+    Html,
+    figure,
+    panels,
+    section,
+    table,
+    tag,
+)
+from calibrate.report.elements.svg import drawn, log_axis
+from calibrate.report.elements.tones import (
+    Tone,
+    colour_key,
+    place_mark,
+    tone_of,
+)
+from calibrate.report.evidence.session_evidence import SpotSession
 
 Floats = NDArray[np.float64]
 

@@ -10,18 +10,35 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from calibrate.default_belief import said_of
-from calibrate.export.nominal_table import cells, nominal_table
-from calibrate.identifiability import WEAK
-from calibrate.identification.session import holds_spots
-from calibrate.model_file import ModelFile, ModelParameter
-from calibrate.observability import WELL_CONDITIONED
-from calibrate.parameters import Parameter
-from calibrate.report.elements import Html, bullets, figure, folded, halves, join, panels, section, table, tag
-from calibrate.report.not_determined import in_plain_words, kind_of, reason_among
-from calibrate.report.quantities import DASH, aligned, decimals_of, fixed, significant
-from calibrate.report.session_evidence import SessionEvidence
-from calibrate.report.svg import spectrum
+from calibrate.apply.export.nominal_table import cells, nominal_table
+from calibrate.fit.identify.session import holds_spots
+from calibrate.fit.rank.identifiability import WEAK
+from calibrate.fit.rank.not_determined import in_plain_words, kind_of, reason_among
+from calibrate.fit.rank.observability import WELL_CONDITIONED
+from calibrate.model.default_tolerance import said_of
+from calibrate.model.model_file import ModelFile, ModelParameter
+from calibrate.model.parameters import Parameter
+from calibrate.quantities import (
+    DASH,
+    aligned,
+    decimals_of,
+    fixed,
+    significant,
+)
+from calibrate.report.elements.html import (
+    Html,
+    bullets,
+    figure,
+    folded,
+    halves,
+    join,
+    panels,
+    section,
+    table,
+    tag,
+)
+from calibrate.report.elements.svg import spectrum
+from calibrate.report.evidence.session_evidence import SessionEvidence
 
 TITLE = "What was identified, and what was not"
 MOST_LISTED = 12  # parameters without a number: of more, one line a reason, the rest folded

@@ -3,15 +3,34 @@
 from collections.abc import Iterator, Sequence
 
 from acquisition.recording.rig import Rig
-from calibrate.model_file import FreeSpaceRecord, ModelFile, UnseenRows
-from calibrate.report.elements import Html, bullets, section, table, tag
-from calibrate.report.model_tests import fit_end, proofs, repeated, scatter
-from calibrate.report.quantities import DASH, angle, doubted_angle, doubted_length, fixed, length, significant
-from calibrate.report.session_evidence import SessionEvidence
-from calibrate.sensors.catalogue import SOURCES, kind_of
-from calibrate.sensors.kind import NoiseSource
-from calibrate.uncertainty.fit_statistics import Alarm
-from calibrate.weighting import JOINT
+from calibrate.fit.accuracy.fit_statistics import Alarm
+from calibrate.fit.weighting import JOINT
+from calibrate.model.model_file import FreeSpaceRecord, ModelFile, UnseenRows
+from calibrate.model.sensors.catalogue import SOURCES, kind_of
+from calibrate.model.sensors.kind import NoiseSource
+from calibrate.quantities import (
+    DASH,
+    angle,
+    doubted_angle,
+    doubted_length,
+    fixed,
+    length,
+    significant,
+)
+from calibrate.report.elements.html import (
+    Html,
+    bullets,
+    section,
+    table,
+    tag,
+)
+from calibrate.report.evidence.model_tests import (
+    fit_end,
+    proofs,
+    repeated,
+    scatter,
+)
+from calibrate.report.evidence.session_evidence import SessionEvidence
 
 
 def free_space(found: FreeSpaceRecord | None) -> list[Html]:

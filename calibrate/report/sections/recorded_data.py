@@ -7,9 +7,16 @@ from numpy.typing import NDArray
 
 from acquisition.recording import Recording, check
 from acquisition.recording.rig import Rig
-from calibrate.report.elements import Html, folded, join, section, table, tag
-from calibrate.report.quantities import fixed, significant
-from calibrate.report.session_evidence import SessionEvidence
+from calibrate.quantities import fixed, significant
+from calibrate.report.elements.html import (
+    Html,
+    folded,
+    join,
+    section,
+    table,
+    tag,
+)
+from calibrate.report.evidence.session_evidence import SessionEvidence
 
 Floats = NDArray[np.float64]
 

@@ -9,14 +9,27 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from calibrate.errors import DataError
-from calibrate.observations import Observations
-from calibrate.report.elements import Html, figure, panels, section, table, tag
-from calibrate.report.reflection_figure import reflection
-from calibrate.report.rig_figures import from_above, oblique
-from calibrate.report.rig_scene import fitted_rig, scene
-from calibrate.report.session_evidence import SpotSession
-from calibrate.report.svg import drawn
-from calibrate.report.tones import Tone, colour_key, patch, place_mark, place_name
+from calibrate.model.observations import Observations
+from calibrate.report.elements.html import (
+    Html,
+    figure,
+    panels,
+    section,
+    table,
+    tag,
+)
+from calibrate.report.elements.svg import drawn
+from calibrate.report.elements.tones import (
+    Tone,
+    colour_key,
+    patch,
+    place_mark,
+    place_name,
+)
+from calibrate.report.evidence.session_evidence import SpotSession
+from calibrate.report.figures.reflection_figure import reflection
+from calibrate.report.figures.rig_figures import from_above, oblique
+from calibrate.report.figures.rig_scene import fitted_rig, scene
 
 Floats = NDArray[np.float64]
 

@@ -7,19 +7,24 @@ import numpy as np
 
 from acquisition.recording import Recording
 from acquisition.recording.rig.schema import SiteInstrument
-from calibrate.diagnose.schema import DiagnosisFile
-from calibrate.model_file import FreeSpaceRecord
-from calibrate.report.elements import Html, figure, section, tag
-from calibrate.report.model_tests import proofs
-from calibrate.report.quantities import DASH, length, significant
+from calibrate.diagnose.record.schema import DiagnosisFile
+from calibrate.model.model_file import FreeSpaceRecord
+from calibrate.model.sensors.catalogue import kind_of
+from calibrate.quantities import DASH, length, significant
+from calibrate.report.elements.html import (
+    Html,
+    figure,
+    section,
+    tag,
+)
+from calibrate.report.elements.verdict import Answers, Number, first_screen
+from calibrate.report.evidence.model_tests import proofs
+from calibrate.report.evidence.session_evidence import Readings, SessionEvidence
+from calibrate.report.evidence.session_verdict import session_verdict
 from calibrate.report.sections.parameter_tables import table_part
 from calibrate.report.sections.zeros import determined, limits_of_zeros
-from calibrate.report.session_evidence import Readings, SessionEvidence
-from calibrate.report.session_verdict import session_verdict
-from calibrate.report.verdict import Answers, Number, first_screen
 from calibrate.report.workspace.pictures import tool_maps
 from calibrate.report.workspace.workspace_errors import Room, limit_of, tool_numbers
-from calibrate.sensors.catalogue import kind_of
 
 TITLE = "Certificate"
 LEAD = "From [site] of the rig file, as recorded. What is absent there is a blank line in print."

@@ -5,19 +5,35 @@ from math import degrees, hypot
 
 from matplotlib.figure import Figure
 
-from calibrate.default_belief import links_of
-from calibrate.fit_plan import BesideName, parse_plan
-from calibrate.identification.estimates import Estimate, JointZero, joint_zeros
-from calibrate.identification.planned import rig_as_planned
-from calibrate.identification.point_constraint import PointConstraintResult, point_constraints
-from calibrate.report.elements import Html, bullets, figure, panels, section, table, tag
-from calibrate.report.not_determined import in_plain_words, plain_reason, reason_among
-from calibrate.report.quantities import DASH, aligned, angle, decimals_of, fixed, length, significant
-from calibrate.report.session_evidence import SessionEvidence
-from calibrate.report.svg import drawn, log_axis, spectrum
-from calibrate.report.tones import Tone
+from calibrate.fit.fit_plan import BesideName, parse_plan
+from calibrate.fit.identify.estimates import Estimate, JointZero, joint_zeros
+from calibrate.fit.identify.planned import rig_as_planned
+from calibrate.fit.identify.point_constraint import PointConstraintResult, point_constraints
+from calibrate.fit.rank.not_determined import in_plain_words, plain_reason, reason_among
+from calibrate.model.default_tolerance import links_of
+from calibrate.model.sensors import spots
+from calibrate.quantities import (
+    DASH,
+    aligned,
+    angle,
+    decimals_of,
+    fixed,
+    length,
+    significant,
+)
+from calibrate.report.elements.html import (
+    Html,
+    bullets,
+    figure,
+    panels,
+    section,
+    table,
+    tag,
+)
+from calibrate.report.elements.svg import drawn, log_axis, spectrum
+from calibrate.report.elements.tones import Tone
+from calibrate.report.evidence.session_evidence import SessionEvidence
 from calibrate.report.workspace.workspace_errors import whole_covariance
-from calibrate.sensors import spots
 
 ROW_IN = 0.3
 

@@ -18,8 +18,8 @@ from matplotlib.path import Path
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
-from calibrate.report.quantities import length
-from calibrate.report.tones import Tone
+from calibrate.quantities import length
+from calibrate.report.elements.tones import Tone
 
 Floats = NDArray[np.float64]
 

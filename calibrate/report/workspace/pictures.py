@@ -11,8 +11,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from calibrate.report.elements import Html
-from calibrate.report.svg import drawn
+from calibrate.report.elements.html import Html
+from calibrate.report.elements.svg import drawn
 from calibrate.report.workspace.cells import (
     SIDE,
     VIEWS,

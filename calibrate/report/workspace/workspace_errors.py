@@ -15,20 +15,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from calibrate.alignment import aligned_difference
-from calibrate.arms.model import KinematicModel
-from calibrate.arms.rig_arm import limits_of
-from calibrate.diagnose.schema import DiagnosisFile
-from calibrate.identifiability import Identifiability
-from calibrate.model_file import Covariance, Fields, FreeSpaceRecord
-from calibrate.parameters import Parameter, index_of, without_assumed
-from calibrate.report.not_determined import in_plain_words
-from calibrate.report.quantities import DASH, length
-from calibrate.report.session_evidence import SessionEvidence
-from calibrate.report.verdict import Number
-from calibrate.rigid import cross_matrix
-from calibrate.sensors.catalogue import LENGTHS
-from calibrate.uncertainty.free_space import (
+from calibrate.diagnose.record.schema import DiagnosisFile
+from calibrate.fit.accuracy.free_space import (
     FreeSpaceStatus,
     Scatter,
     Workspace,
@@ -36,7 +24,19 @@ from calibrate.uncertainty.free_space import (
     target_by_parameter,
     variance_of_scatter,
 )
-from calibrate.unseen_along import analyse_along
+from calibrate.fit.rank.identifiability import Identifiability
+from calibrate.fit.rank.not_determined import in_plain_words
+from calibrate.fit.rank.unseen_along import analyse_along
+from calibrate.model.alignment import aligned_difference
+from calibrate.model.arms.rig_arm import limits_of
+from calibrate.model.kinematic_model import KinematicModel
+from calibrate.model.model_file import Covariance, Fields, FreeSpaceRecord
+from calibrate.model.parameters import Parameter, index_of, without_assumed
+from calibrate.model.rigid import cross_matrix
+from calibrate.model.sensors.catalogue import LENGTHS
+from calibrate.quantities import DASH, length
+from calibrate.report.elements.verdict import Number
+from calibrate.report.evidence.session_evidence import SessionEvidence
 
 Floats = NDArray[np.float64]
 

@@ -6,15 +6,24 @@ from typing import Self
 import numpy as np
 
 from acquisition.recording import Samples
-from calibrate.chain import Chain
-from calibrate.measured import Measured
-from calibrate.parameters import Parameter
-from calibrate.rigid import transform
-from calibrate.sample_table import SampleTable
-from calibrate.sensors.device import Device
-from calibrate.sensors.kind import Columns, Floats, Found, Frame, NoiseSource, Rows, SensorKind, Trait
-from calibrate.sensors.model import About, Usage
-from calibrate.sensors.target import Target, point_by_twist
+from calibrate.model.chain import Chain
+from calibrate.model.measured import Measured
+from calibrate.model.parameters import Parameter
+from calibrate.model.placement.device import Device
+from calibrate.model.placement.target import Target, point_by_twist
+from calibrate.model.rigid import transform
+from calibrate.model.sample_table import SampleTable
+from calibrate.model.sensor_model import About, Usage
+from calibrate.model.sensors.kind import (
+    Columns,
+    Floats,
+    Found,
+    Frame,
+    NoiseSource,
+    Rows,
+    SensorKind,
+    Trait,
+)
 
 COLUMN = "height_m"
 SIGMA_M = 10e-6  # one sigma to start from; the data correct it

@@ -3,8 +3,8 @@
 Source: Orocos KDL, class Segment: the pose of a segment is that of its joint, then the fixed frame behind it.
 """
 
-from calibrate.export.export import ExportForm
-from calibrate.export.identified import IdentifiedArm
+from calibrate.apply.export.export import ExportForm
+from calibrate.apply.export.identified import IdentifiedArm
 
 
 def text(arm: IdentifiedArm) -> str:

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from acquisition.recording.rig import load_rig
-from calibrate.arms.belief import LinkBelief
-from calibrate.arms.dh import DhArm, DhLink
-from calibrate.arms.rig_arm import RigArm
+from calibrate.model.arms.dh import DhArm, DhLink
+from calibrate.model.arms.link_tolerance import LinkBelief
+from calibrate.model.arms.rig_arm import RigArm
 
 RIG = Path(__file__).parents[3] / "rigs" / "ur5e-dual-psd.toml"
 QUARTER = np.pi / 2.0

@@ -19,7 +19,7 @@ from calibeam.fleet.summary import Fleet
 from calibeam.fleet.table import read_rows
 from calibeam.fleet.worker import _zeros, judge_recording
 from calibeam.outcome import PartialResult
-from calibrate.model_file import ModelParameter
+from calibrate.model.model_file import ModelParameter
 
 RIG = Path(__file__).parents[3] / "rigs" / "irb120-modbus.toml"
 OFF_RAD_YEAR = 0.02  # of joint 2: far beyond any doubt of two dates

@@ -13,11 +13,11 @@ from benchmarks.direct_hand import DirectHand
 from calibeam.guided.judge import FittedJudge
 from calibeam.guided.recorded import BelievedGuidedArm
 from calibeam.guided.refit import samples_of
-from calibrate.fit import Status
-from calibrate.identification.identify import identify
-from calibrate.identification.record import record_of
-from calibrate.model_file import RigIdentity
-from calibrate.predict import Predictor
+from calibrate.fit.identify.identify import identify
+from calibrate.fit.identify.record import record_of
+from calibrate.fit.solvers import Status
+from calibrate.model.model_file import RigIdentity
+from calibrate.model.predict import Predictor
 from simulators.hand.world import HandWorld
 
 RIG_FILE = Path(__file__).parents[3] / "rigs" / "arm-cmm-reference.toml"

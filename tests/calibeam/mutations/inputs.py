@@ -30,9 +30,9 @@ from calibeam.fleet.row import Task
 from calibeam.fleet.table import write_rows
 from calibeam.fleet.worker import judge_recording
 from calibeam.guided.recorded import BelievedGuidedArm
-from calibrate.arms.catalogue import arm_of
-from calibrate.arms.eccentric import with_discs
-from calibrate.model_file import ModelFile, RigIdentity, write_model
+from calibrate.model.arms.catalogue import arm_of
+from calibrate.model.arms.eccentric import with_discs
+from calibrate.model.model_file import ModelFile, RigIdentity, write_model
 from drivers.psd_error_map import ErrorMap
 from simulators.conceal.case import conceal
 from simulators.conceal.case_files import write_case

@@ -43,7 +43,7 @@ LAZY = (  # loaded by commands when they need them; here once for all
     "calibeam.printing.design",
     "calibeam.motion.reachable_poses",
     "calibrate.error_simulation.simulate",
-    "calibrate.pose_design.design",
+    "calibrate.design.design",
     "calibrate.report.pose_design_page",
     "acquisition.centring.camera.measuring",
     "calibeam.fleet.table",

@@ -7,8 +7,8 @@ import pytest
 from acquisition.recording.rig import parse_rig
 from calibeam.new_rig.drawn import poe_text
 from calibeam.new_rig.from_mjcf import mjcf_arm
-from calibrate.arms.rig_arm import RigArm
 from calibrate.errors import DataError
+from calibrate.model.arms.rig_arm import RigArm
 
 ARM = """<mujoco model="crooked">
   <compiler angle="radian" autolimits="true"/>

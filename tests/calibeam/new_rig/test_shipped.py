@@ -11,8 +11,8 @@ import pytest
 
 from acquisition.recording.rig import load_rig
 from calibeam.commands.rig import shipped_rigs, shipped_text
-from calibrate.arms.rig_arm import RigArm
 from calibrate.errors import DataError
+from calibrate.model.arms.rig_arm import RigArm
 
 AT_ZERO_MM = {
     "abb-irb120": (302 + 72, 0, 290 + 270 + 70),

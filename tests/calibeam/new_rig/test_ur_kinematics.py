@@ -7,9 +7,9 @@ from scipy.spatial.transform import Rotation
 from acquisition.recording.rig import Make, load_rig, parse_rig, rig_text
 from calibeam.cli import run
 from calibeam.commands.rig import shipped_rigs
-from calibrate.arms.catalogue import arm_of
-from calibrate.arms.rig_arm import RigArm
-from calibrate.export.export import export_text, form_named
+from calibrate.apply.export.export import export_text, form_named
+from calibrate.model.arms.catalogue import arm_of
+from calibrate.model.arms.rig_arm import RigArm
 
 BODIES = ("shoulder", "upper_arm", "forearm", "wrist_1", "wrist_2", "wrist_3")
 KEYS = ("x", "y", "z", "roll", "pitch", "yaw")

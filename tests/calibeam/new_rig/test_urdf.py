@@ -9,8 +9,8 @@ import pytest
 from acquisition.recording.rig import parse_rig
 from calibeam.new_rig.drawn import poe_text
 from calibeam.new_rig.from_urdf import urdf_arm
-from calibrate.arms.rig_arm import RigArm
 from calibrate.errors import DataError
+from calibrate.model.arms.rig_arm import RigArm
 
 ARM = """<?xml version="1.0"?>
 <robot name="crooked">

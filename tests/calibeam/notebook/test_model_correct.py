@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 import calibeam
 from calibeam.cli import run
-from calibrate.model_file import write_model
+from calibrate.model.model_file import write_model
 
 from ...calibrate.correct.six_joints import drawn, model, postures, real
 from ...calibrate.physics.two_joints import two_joints

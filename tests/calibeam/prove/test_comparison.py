@@ -15,14 +15,14 @@ from calibeam.prove.comparison import GEOMETRY, compare, fold_of, oracle_terms
 from calibeam.prove.record import Truth, truth_of
 from calibeam.prove.scoring import errors_m
 from calibeam.prove.unseen import tool_at, write_asked
-from calibrate.diagnose.bench import Bench
-from calibrate.diagnose.diagnosis import Verdict
-from calibrate.diagnose.file import write_diagnosis
-from calibrate.diagnose.fitted import Fitted, fit_geometry
-from calibrate.diagnose.folds import splits_of
-from calibrate.diagnose.schema import DiagnosisFile
-from calibrate.diagnose.session import session_of
-from calibrate.diagnose.stated_sizes import sizes_of
+from calibrate.diagnose.doubts.diagnosis import Verdict
+from calibrate.diagnose.doubts.folds import splits_of
+from calibrate.diagnose.record.file import write_diagnosis
+from calibrate.diagnose.record.schema import DiagnosisFile
+from calibrate.diagnose.search.bench import Bench
+from calibrate.diagnose.search.stated_sizes import sizes_of
+from calibrate.diagnose.state.fitted import Fitted, fit_geometry
+from calibrate.diagnose.state.session import session_of
 from simulators.conceal.case import conceal
 from simulators.conceal.case_files import truth_document, write_case
 from simulators.conceal.wanted import Family, Wanted

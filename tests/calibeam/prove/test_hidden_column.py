@@ -7,7 +7,7 @@ import pytest
 
 from acquisition.recording import Samples
 from benchmarks.hidden_columns import against_hidden, real_sets
-from calibrate.diagnose.schema import CurveRecord, DiagnosisFile, FindingRecord
+from calibrate.diagnose.record.schema import CurveRecord, DiagnosisFile, FindingRecord
 from calibrate.errors import DataError
 
 T_S = np.arange(0.0, 3600.0, 30.0)

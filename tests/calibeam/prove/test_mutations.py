@@ -8,8 +8,8 @@ import pytest
 
 from benchmarks.forgotten_effects import MUTATIONS, caught, main
 from calibeam.prove.record import CaseScore, DefectScore, NamedCause
-from calibrate.effects.catalogue import EFFECTS
 from calibrate.errors import DataError
+from calibrate.model.effects.catalogue import EFFECTS
 from simulators.conceal.wanted import INSTRUMENT
 from simulators.defects import MECHANISMS
 

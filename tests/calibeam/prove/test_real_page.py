@@ -6,7 +6,7 @@ import msgspec
 import pytest
 
 from benchmarks.hidden_columns import HiddenAngle, HiddenColumn, RealScore, real_html
-from calibrate.diagnose.schema import DiagnosisFile, FindingRecord, UnexplainedRecord
+from calibrate.diagnose.record.schema import DiagnosisFile, FindingRecord, UnexplainedRecord
 
 SAYS = "joint 2 bends under gravity"
 

@@ -14,8 +14,8 @@ from calibeam.prove.scenario import Scenario
 from calibeam.prove.scoring import score
 from calibeam.prove.seal import Layout
 from calibeam.results.comparison import ComparisonFile, DifferenceRecord
-from calibrate.diagnose.file import write_diagnosis
-from calibrate.diagnose.schema import (
+from calibrate.diagnose.record.file import write_diagnosis
+from calibrate.diagnose.record.schema import (
     BlunderRecord,
     DiagnosisFile,
     FindingRecord,

@@ -5,7 +5,7 @@ import pytest
 
 from acquisition.session.plan import PlanOptions, blocks
 from calibeam.sessions.forecast import ahead_of_blocks, forecast
-from calibrate.pose_design.information import information_of
+from calibrate.design.information import information_of
 
 GOAL_M = 10e-6
 

@@ -12,8 +12,8 @@ from calibeam.cli import run
 from calibeam.simulation.emulated import emulated
 from calibeam.simulation.mechanism_by_hand import BY_HAND, by_hand, form, unit_of
 from calibrate.errors import DataError
-from calibrate.model_file import RigIdentity
-from calibrate.predict import Predictor
+from calibrate.model.model_file import RigIdentity
+from calibrate.model.predict import Predictor
 from simulators.defects import WrittenError
 from simulators.defects.drive import SlackDrive, SoftJoint
 from simulators.defects.fixture import BumpedFixture

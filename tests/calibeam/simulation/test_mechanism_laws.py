@@ -15,24 +15,24 @@ from calibeam.simulation.found import FoundEffect, FoundIn
 from calibeam.simulation.mechanism_table import TABLE, line_of, mechanism_of
 from calibeam.simulation.rig_in_numbers import rigged
 from calibeam.simulation.scene_of_samples import Clock, scene_of
-from calibrate.diagnose.ported import perturbed_frames
-from calibrate.effects.catalogue import terms_of
-from calibrate.effects.drivers import Readout
-from calibrate.effects.fixture_moved import ONE_BODY
-from calibrate.effects.ports import Perturbation
-from calibrate.effects.second_encoders import PLACES
-from calibrate.effects.term import Shape, Term
-from calibrate.identification.session import about_of
-from calibrate.physics.acting import arm_in, moved_columns
-from calibrate.predict import Predictor, readings
-from calibrate.sensors.camera import PLACE, TURN
-from calibrate.sensors.encoder_difference import NAME as ENCODER_DIFFERENCE
+from calibrate.fit.identify.session import about_of
+from calibrate.model.effects.catalogue import terms_of
+from calibrate.model.effects.drivers import Readout
+from calibrate.model.effects.fixture_moved import ONE_BODY
+from calibrate.model.effects.ports import Perturbation
+from calibrate.model.effects.second_encoders import PLACES
+from calibrate.model.effects.term import Shape, Term
+from calibrate.model.predict import Predictor, readings
+from calibrate.model.sensors.camera import PLACE, TURN
+from calibrate.model.sensors.encoder_difference import NAME as ENCODER_DIFFERENCE
+from calibrate.model.with_effects.acting import arm_in, moved_columns
+from calibrate.model.with_effects.ported_chain import perturbed_frames
 from simulators.conceal.case import conceal
 from simulators.conceal.rig_file import rig_document, toml_text
 from simulators.conceal.wanted import FAMILIES, Family
 from simulators.defects import Scene
 from simulators.replayed import Readings, Rigged, Sited, replayed
-from tests.calibrate.effects.conftest import full_session, wanted
+from tests.calibrate.model.effects.conftest import full_session, wanted
 
 SIZE = 5e-5  # rad or m at a port: what a machine shows
 

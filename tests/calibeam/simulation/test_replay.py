@@ -13,11 +13,11 @@ from calibeam.commands.replay import replay_command
 from calibeam.simulation.physics import names_of
 from calibeam.simulation.replayed_recording import replay, write_replayed
 from calibeam.simulation.rig_in_numbers import arm_in_numbers
+from calibrate.apply.predicting import predict_with_physics
 from calibrate.errors import DataError
-from calibrate.model_file import ModelFile, RigIdentity, write_model
-from calibrate.physics.predicting import predict_with_physics
-from calibrate.physics.records import Effect, SessionRecord
-from calibrate.predict import Predictor
+from calibrate.model.effect_records import Effect, SessionRecord
+from calibrate.model.model_file import ModelFile, RigIdentity, write_model
+from calibrate.model.predict import Predictor
 from tests.calibeam.simulation.test_mechanism_laws import Bench, bench
 
 DEMO = Path("tests/golden/data/demo.mcap")

@@ -10,10 +10,16 @@ import pytest
 from numpy.typing import NDArray
 
 from acquisition.recording.rig import Rig
-from calibrate.diagnose.linearised import Rows, Unseen
-from calibrate.effects.drivers import Drivers
-from calibrate.effects.ports import Place, Port
-from calibrate.effects.term import Accepted, Inner, Shape, Size, Term
+from calibrate.diagnose.state.linearised import Rows, Unseen
+from calibrate.model.effects.drivers import Drivers
+from calibrate.model.effects.ports import Place, Port
+from calibrate.model.effects.term import (
+    Accepted,
+    Inner,
+    Shape,
+    Size,
+    Term,
+)
 
 Floats = NDArray[np.float64]
 

@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 
 from acquisition.recording import read
-from calibrate.blunders.finding import BlunderKind
-from calibrate.diagnose.diagnosis import Verdict
-from calibrate.diagnose.fitted import fit_geometry
+from calibrate.diagnose.doubts.diagnosis import Verdict
 from calibrate.diagnose.from_recording import diagnose_samples, runs_of
-from calibrate.diagnose.session import session_of
-from calibrate.diagnose.to_file import file_of
-from calibrate.physics.from_diagnosis import model_of_diagnosis
+from calibrate.diagnose.record.to_file import file_of
+from calibrate.diagnose.state.fitted import fit_geometry
+from calibrate.diagnose.state.session import session_of
+from calibrate.diagnose.with_model.from_diagnosis import model_of_diagnosis
+from calibrate.model.checks.gross_error import BlunderKind
 from simulators.conceal.case import conceal
 from simulators.conceal.case_files import write_case
 from simulators.conceal.wanted import Wanted

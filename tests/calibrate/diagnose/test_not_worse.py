@@ -10,12 +10,12 @@ from acquisition.recording import read
 from benchmarks.real_diagnosis import apart, errors_m, rms_um, through_a_file
 from calibeam.results.diagnosis import diagnose_recording
 from calibeam.results.identification import identify_session, session_model
-from calibrate.diagnose.doubt import doubted
-from calibrate.diagnose.fitted import fit_geometry
-from calibrate.diagnose.session import session_of
-from calibrate.effects.catalogue import missing_of
-from calibrate.physics.from_diagnosis import model_of_diagnosis
-from calibrate.sensors.encoder_difference import NAME as ENCODER_DIFFERENCE
+from calibrate.diagnose.doubts.doubt import doubted
+from calibrate.diagnose.state.fitted import fit_geometry
+from calibrate.diagnose.state.session import session_of
+from calibrate.diagnose.with_model.from_diagnosis import model_of_diagnosis
+from calibrate.model.effects.catalogue import missing_of
+from calibrate.model.sensors.encoder_difference import NAME as ENCODER_DIFFERENCE
 from simulators.conceal.wanted import FAMILIES
 
 from .concealed import recording_of

@@ -9,12 +9,12 @@ import pytest
 
 from acquisition.recording import read
 from calibeam.cli import run
-from calibrate.diagnose.diagnosis import Verdict
+from calibrate.diagnose.doubts.diagnosis import Verdict
 from calibrate.diagnose.from_recording import diagnose_samples
-from calibrate.model_file import read_model
-from calibrate.report.model_tests import proofs
+from calibrate.model.model_file import read_model
+from calibrate.report.evidence.model_tests import proofs
+from calibrate.report.evidence.session_evidence import session_evidence
 from calibrate.report.sections.zeros import zeros_of
-from calibrate.report.session_evidence import session_evidence
 
 from .concealed import recording_of
 

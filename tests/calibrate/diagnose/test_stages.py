@@ -8,13 +8,14 @@ import pytest
 
 from acquisition.recording import read
 from calibeam.results.diagnosis import diagnose_to_file
-from calibrate.diagnose import doubt, from_recording
-from calibrate.diagnose.bench import Bench, recent_menu
+from calibrate.diagnose import from_recording
 from calibrate.diagnose.diagnose import diagnose
-from calibrate.diagnose.diagnosis import Verdict
-from calibrate.diagnose.port_process import processes
-from calibrate.diagnose.score import Removed
-from calibrate.diagnose.search import search
+from calibrate.diagnose.doubts import doubt
+from calibrate.diagnose.doubts.diagnosis import Verdict
+from calibrate.diagnose.search.bench import Bench, recent_menu
+from calibrate.diagnose.search.port_process import processes
+from calibrate.diagnose.search.score import Removed
+from calibrate.diagnose.search.search import search
 from calibrate.diagnose.stages import NOT_YET, Stage, Stages
 from calibrate.errors import DataError
 

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from calibrate.diagnose.bench import Bench
 from calibrate.diagnose.diagnose import diagnose
-from calibrate.diagnose.diagnosis import Verdict
-from calibrate.diagnose.proof import near_in_time
+from calibrate.diagnose.doubts.diagnosis import Verdict
+from calibrate.diagnose.doubts.proof import near_in_time
+from calibrate.diagnose.search.bench import Bench
 from calibrate.diagnose.time_left import time_left
 
 SEEDS = 5

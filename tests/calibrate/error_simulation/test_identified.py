@@ -6,10 +6,10 @@ import pytest
 from acquisition.recording.rig import load_rig, rig_sha256, rig_text
 from calibrate.error_simulation.machine import identified_machine, machine_of
 from calibrate.errors import DataError
-from calibrate.identification.identify import identify
-from calibrate.identification.record import record_of
-from calibrate.model_file import RigIdentity
-from calibrate.predict import Predictor
+from calibrate.fit.identify.identify import identify
+from calibrate.fit.identify.record import record_of
+from calibrate.model.model_file import RigIdentity
+from calibrate.model.predict import Predictor
 
 from ..conftest import spot_samples
 from .conftest import RIGS

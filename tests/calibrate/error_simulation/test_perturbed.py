@@ -4,9 +4,19 @@ import numpy as np
 from scipy import stats
 from scipy.spatial.transform import Rotation
 
-from calibrate.error_simulation.machine import ArmAtPoses, Columns, columns_of, probe_errors
+from calibrate.error_simulation.machine import (
+    ArmAtPoses,
+    Columns,
+    columns_of,
+    probe_errors,
+)
 from calibrate.error_simulation.monte_carlo import CHUNK, count_chunk
-from calibrate.error_simulation.sources import Law, Source, Term, Wave
+from calibrate.error_simulation.sources import (
+    Law,
+    Source,
+    Term,
+    Wave,
+)
 
 NORMAL = Law("normal", 1.0)
 

@@ -5,7 +5,12 @@ import numpy as np
 import pytest
 
 from acquisition.recording.rig import load_rig
-from calibrate.error_simulation.error_plan import ErrorPlan, SourceEntry, read_error_plan, sources_of
+from calibrate.error_simulation.error_plan import (
+    ErrorPlan,
+    SourceEntry,
+    read_error_plan,
+    sources_of,
+)
 from calibrate.error_simulation.machine import machine_of
 from calibrate.errors import DataError
 

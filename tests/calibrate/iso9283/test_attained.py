@@ -7,7 +7,7 @@ from acquisition.recording import Samples, readings_sha256
 from acquisition.recording.pose_plan import PlannedBlock, PlannedPose, PosePlan
 from acquisition.recording.rig import parse_rig
 from acquisition.recording.samples import measured_sha256
-from calibrate.correct.corrected import Options, Wanted, correct
+from calibrate.apply.correct.corrected import Options, Wanted, correct
 from calibrate.errors import DataError
 from calibrate.iso9283.attained import evaluate
 

@@ -5,10 +5,10 @@ from scipy.spatial.transform import Rotation
 
 from acquisition.recording import Samples
 from acquisition.recording.rig import parse_rig
-from calibrate.arms.rig_arm import RigArm
 from calibrate.iso9283.cube import CYCLE, cube_poses_m
-from calibrate.model_file import RigIdentity
-from calibrate.rigid import inverse, transform
+from calibrate.model.arms.rig_arm import RigArm
+from calibrate.model.model_file import RigIdentity
+from calibrate.model.rigid import inverse, transform
 
 from ..correct.six_joints import CHAIN, RIG, model
 from ..correct.six_joints import inverse as inverse_kinematics

@@ -10,14 +10,14 @@ from scipy.spatial.transform import Rotation
 from acquisition.recording import Recording, Samples
 from acquisition.recording.rig import parse_rig, rig_sha256, rig_text
 from calibeam.results.identification import identify_session, session_model
-from calibrate.diagnose.blunders_first import blunders_first
-from calibrate.diagnose.fitted import fit_geometry
-from calibrate.diagnose.session import session_of
-from calibrate.identification.identify import identify
-from calibrate.identification.record import record_of
-from calibrate.model_file import ModelFile, RigIdentity
-from calibrate.physics.from_diagnosis import model_of_fit
-from calibrate.report.session_evidence import SessionEvidence, session_evidence
+from calibrate.diagnose.gross_errors_first import blunders_first
+from calibrate.diagnose.state.fitted import fit_geometry
+from calibrate.diagnose.state.session import session_of
+from calibrate.diagnose.with_model.from_diagnosis import model_of_fit
+from calibrate.fit.identify.identify import identify
+from calibrate.fit.identify.record import record_of
+from calibrate.model.model_file import ModelFile, RigIdentity
+from calibrate.report.evidence.session_evidence import SessionEvidence, session_evidence
 from calibrate.report.session_report import session_page
 from tests.support.recorded_session import recorded_session
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from calibrate.report.error_figures import FARTHEST, paint_histogram, paint_quantiles
+from calibrate.report.figures.error_figures import FARTHEST, paint_histogram, paint_quantiles
 
 
 @pytest.fixture

@@ -9,10 +9,10 @@ from msgspec.structs import replace
 
 from acquisition.recording import read
 from calibeam.cli import run
-from calibrate.export.nominal_table import cells, nominal_table, to_sigma
-from calibrate.model_file import read_model, write_model
+from calibrate.apply.export.nominal_table import cells, nominal_table, to_sigma
+from calibrate.model.model_file import read_model, write_model
+from calibrate.report.evidence.session_evidence import session_evidence
 from calibrate.report.sections.parameter_tables import table_part
-from calibrate.report.session_evidence import session_evidence
 
 from ..export.tracked import tracked
 

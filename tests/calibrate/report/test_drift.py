@@ -9,7 +9,7 @@ import pytest
 from calibrate.errors import DataError
 from calibrate.report.drift.drift_chapter import drift_chapter, sentence
 from calibrate.report.drift.two_calibrations import Calibration, drift_of
-from calibrate.report.session_evidence import session_evidence
+from calibrate.report.evidence.session_evidence import session_evidence
 from calibrate.report.session_report import session_answers
 from calibrate.report.workspace.workspace_errors import session_arm
 

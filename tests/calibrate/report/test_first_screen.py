@@ -9,9 +9,16 @@ import numpy as np
 import pytest
 
 from calibeam.results.session_results import accuracy_of
-from calibrate.report.session_evidence import session_evidence
+from calibrate.report.elements.verdict import (
+    MARKS,
+    Answers,
+    Number,
+    Trust,
+    Verdict,
+    first_screen,
+)
+from calibrate.report.evidence.session_evidence import session_evidence
 from calibrate.report.session_report import session_answers
-from calibrate.report.verdict import MARKS, Answers, Number, Trust, Verdict, first_screen
 from calibrate.report.workspace.workspace_errors import session_room
 
 QUESTIONS = ("How good is it now?", "Can I trust it?", "What to do?")

@@ -8,10 +8,10 @@ import shutil
 
 import pytest
 
-from calibrate.report.elements import Html, page
-from calibrate.report.interactive.plots import interactive_chapter
-from calibrate.report.interactive.session_figures import session_figures
-from calibrate.report.session_evidence import session_evidence
+from calibrate.report.elements.html import Html, page
+from calibrate.report.evidence.session_evidence import session_evidence
+from calibrate.report.figures.plots import interactive_chapter
+from calibrate.report.figures.session_figures import session_figures
 from tests.support.overlaps import OVERLAPS
 
 MOST_PAGES = 8

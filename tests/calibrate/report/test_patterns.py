@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import f_oneway, kstest
 
-from calibrate.report.session_verdict import GROUPS, pattern, patterns
+from calibrate.report.evidence.session_verdict import GROUPS, pattern, patterns
 
 
 def test_f_and_p_are_those_of_the_one_way_analysis_of_variance():

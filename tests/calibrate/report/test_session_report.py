@@ -11,13 +11,13 @@ import pytest
 from acquisition.recording import RecordingError
 from acquisition.recording.rig import parse_rig
 from calibrate.errors import DataError
-from calibrate.model_file import ModelFile
-from calibrate.report.elements import write_page
+from calibrate.model.model_file import ModelFile
+from calibrate.report.elements.html import write_page
+from calibrate.report.evidence.session_evidence import session_evidence
 from calibrate.report.sections.arm_errors import errors_chapter
 from calibrate.report.sections.parameter_tables import parameters_chapter
 from calibrate.report.sections.proofs import proofs_chapter
 from calibrate.report.sections.recorded_data import data_chapter
-from calibrate.report.session_evidence import session_evidence
 from calibrate.report.session_report import session_answers
 from calibrate.report.workspace.workspace_errors import session_arm
 

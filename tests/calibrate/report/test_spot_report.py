@@ -9,16 +9,16 @@ import numpy as np
 import pytest
 
 from calibeam.results.identification import Planned, identify_session, session_model
-from calibrate.fit import Status
-from calibrate.fit_plan import parse_plan
-from calibrate.report.elements import provenance
+from calibrate.fit.fit_plan import parse_plan
+from calibrate.fit.solvers import Status
+from calibrate.report.elements.html import provenance
+from calibrate.report.elements.verdict import Trust
+from calibrate.report.evidence.session_evidence import session_evidence, spot_session
+from calibrate.report.evidence.session_verdict import session_verdict
 from calibrate.report.sections.centring import centring
 from calibrate.report.sections.proofs import proofs_chapter
 from calibrate.report.sections.zeros import limited_by_measurement, zeros_of
-from calibrate.report.session_evidence import session_evidence, spot_session
 from calibrate.report.session_report import session_answers, session_page
-from calibrate.report.session_verdict import session_verdict
-from calibrate.report.verdict import Trust
 
 PLAN = 'schema = 1\nmethod = "point-constraint"\nshare = 0\n'
 VOID = {"meta", "br", "hr", "img", "input", "link"}

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from acquisition.recording.rig import Arm, ArmModel, Joint, Rig
-from calibrate.arms.catalogue import arm_of
+from calibrate.model.arms.catalogue import arm_of
 from calibrate.tool_axes.arm_prior import ArmErrors, assumed_prior
 from calibrate.tool_axes.tool import calibrate_tool
 from calibrate.tool_axes.wrist_fit import TargetRows

@@ -5,8 +5,13 @@ import pytest
 from numpy.testing import assert_allclose
 
 from calibrate.errors import DataError
-from calibrate.model_file import Covariance, ModelFile, ModelParameter, RigIdentity
-from calibrate.parameters import index_of
+from calibrate.model.model_file import (
+    Covariance,
+    ModelFile,
+    ModelParameter,
+    RigIdentity,
+)
+from calibrate.model.parameters import index_of
 from calibrate.tool_axes.arm_prior import ArmErrors, assumed_prior, prior_of_model
 from tests.calibrate.tool_axes.drawn_arms import UR5, nominal
 

@@ -6,8 +6,8 @@ from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
 from calibrate.errors import DataError
-from calibrate.fit import Status
-from calibrate.rigid import cross
+from calibrate.fit.solvers import Status
+from calibrate.model.rigid import cross
 from calibrate.tool_axes.circle import fit_circle
 
 CENTRE, AXIS = np.array([0.3, -0.2, 0.5]), np.array([1.0, 2.0, -2.0]) / 3.0

@@ -8,7 +8,14 @@ from scipy.spatial.transform import Rotation
 from calibrate.tool_axes.arm_prior import ArmErrors, assumed_prior
 from calibrate.tool_axes.tool import calibrate_tool
 from calibrate.tool_axes.wrist_fit import TargetRows
-from tests.calibrate.tool_axes.drawn_arms import TOOL, UR5, draw, measured, nominal, turns
+from tests.calibrate.tool_axes.drawn_arms import (
+    TOOL,
+    UR5,
+    draw,
+    measured,
+    nominal,
+    turns,
+)
 
 POINTS = TOOL + np.array([[0.0, 0.0, 0.0], [0.1, 0.02, 0.0], [0.0, 0.12, 0.03]])
 TURN = Rotation.from_rotvec([0.3, -1.1, 0.5])

@@ -6,9 +6,9 @@ from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
 from acquisition.recording.rig import Arm, ArmModel, Joint, Rig
-from calibrate.arms.catalogue import arm_of
 from calibrate.errors import DataError
-from calibrate.fit import Status
+from calibrate.fit.solvers import Status
+from calibrate.model.arms.catalogue import arm_of
 from calibrate.tool_axes.arm_prior import assumed_prior
 from calibrate.tool_axes.circle import single_axis_segments
 from calibrate.tool_axes.tool import calibrate_tool

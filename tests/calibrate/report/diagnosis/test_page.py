@@ -7,7 +7,7 @@ import msgspec
 import numpy as np
 import pytest
 
-from calibrate.diagnose.schema import (
+from calibrate.diagnose.record.schema import (
     BlunderRecord,
     CurveRecord,
     DiagnosisFile,
@@ -27,9 +27,19 @@ from calibrate.diagnose.schema import (
     UnexplainedRecord,
 )
 from calibrate.errors import DataError
-from calibrate.model_file import ModelParameter
-from calibrate.report.diagnosis.diagnosis_page import beyond_model, chapters_of, contents_of, inserted
-from calibrate.report.diagnosis.finding_page import chain_figure, chain_of, interval_words, size_words
+from calibrate.model.model_file import ModelParameter
+from calibrate.report.diagnosis.diagnosis_page import (
+    beyond_model,
+    chapters_of,
+    contents_of,
+    inserted,
+)
+from calibrate.report.diagnosis.finding_page import (
+    chain_figure,
+    chain_of,
+    interval_words,
+    size_words,
+)
 from calibrate.report.diagnosis.words import missing_lines, verdict_words
 
 Q = np.linspace(-1.5, 1.5, 60)

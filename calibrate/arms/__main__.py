@@ -1,6 +1,0 @@
-"""`python -m calibrate.arms`: compile the forward kinematics once, so that no later call waits for it."""
-
-from calibrate.arms.compiled import prepare
-
-if __name__ == "__main__":
-    prepare()

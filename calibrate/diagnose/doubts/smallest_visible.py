@@ -1,0 +1,81 @@
+"""How small an effect these poses could have shown: what "nothing is there" is worth, cause by cause.
+
+A size is visible if the search finds it 19 times out of 20 among as many candidates at a family-wise 5 %: its square
+behind geometry is that of a normal deviate beyond the Bonferroni limit by the 95 % quantile (power of a one-sided test
+of a normal mean; Cohen, Statistical Power Analysis, 1988, section 2.3, with the variance known).
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import norm
+
+from calibrate.diagnose.doubts.diagnosis import Named
+from calibrate.diagnose.doubts.findings import NO_SIZE, named
+from calibrate.diagnose.search.bench import Bench
+from calibrate.diagnose.state.visible import VISIBLE, Block
+
+Floats = NDArray[np.float64]
+
+LEVEL, POWER = 0.05, 0.95
+
+
+@dataclass(frozen=True)
+class Smallest:
+    """The smallest size of a cause that would have been found."""
+
+    name: Named
+    parameter: str  # with its unit
+    value: float
+    plausible: bool  # False: no machine is so bad, so these poses do not show the cause at all
+
+
+def smallest_visible(bench: Bench) -> tuple[Smallest, ...]:
+    """Of every place and physics that the poses show, by its best-seen form; inner values at the middle of the grid."""
+    menu, best = bench.menu, dict[tuple[str, str], Smallest]()
+    needed = (norm.isf(LEVEL / (2.0 * max(len(menu.entries), 1))) + norm.ppf(POWER)) ** 2
+    middle = {entry.term: i for i, entry in enumerate(menu.entries) if _is_middle(bench, i)}
+    for block in menu.blocks:
+        for at, i in enumerate(block.entries):
+            if middle.get(menu.entries[i].term) != i:
+                continue
+            found = _smallest(bench, int(i), _coefficients(block, at, float(needed)))
+            if found is None:
+                continue
+            key = (found.name.where, found.name.physics)
+            if key not in best or (found.parameter == best[key].parameter and found.value < best[key].value):
+                best[key] = found
+    return tuple(best.values())
+
+
+def _is_middle(bench: Bench, i: int) -> bool:
+    entry = bench.menu.entries[i]
+    grids = [inner.grid for inner in bench.menu.terms[entry.term].inner]
+    return all(value == grid[len(grid) // 2] for value, grid in zip(entry.inner, grids, strict=True))
+
+
+def _coefficients(block: Block, at: int, needed: float) -> Floats | None:
+    """(k,) which together show the needed square; None where they show nothing."""
+    seen = np.maximum(np.diag(block.gram[at]), 0.0)  # below zero by rounding where geometry can be all of it
+    if not np.any(seen > VISIBLE):
+        return None
+    size = block.size[at] * np.sqrt(seen)
+    share = math.sqrt(needed / np.sum(seen > VISIBLE))
+    return np.where(seen > VISIBLE, share / np.where(size > 0.0, size, 1.0), 0.0)
+
+
+def _smallest(bench: Bench, i: int, coefficients: Floats | None) -> Smallest | None:
+    if coefficients is None:
+        return None
+    entry = bench.menu.entries[i]
+    term, k = bench.menu.terms[entry.term], len(coefficients)
+    sizes = term.sizes(coefficients, np.zeros((k, k)), entry.inner, np.zeros(len(entry.inner)))
+    told = {name: abs(s.value) for name, s in sizes.items() if not name.startswith(NO_SIZE) and s.value != 0.0}
+    if not told:
+        return None
+    name, value = next(iter(told.items()))
+    if not math.isfinite(value):
+        return None
+    return Smallest(named(term), name, value, term.plausible(coefficients, entry.inner, bench.noise_rad))

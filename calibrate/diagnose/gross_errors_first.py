@@ -1,0 +1,184 @@
+"""Gross errors before physics: what is wrong with the file, and which rows have no part in the diagnosis.
+
+Other than before an identification, what moved or drifted stays in: it is the very thing that is sought. Only where
+something stands farther off than any bump moves it (model/effects/moved.py), rows are those of another session.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from acquisition.recording import Samples
+from acquisition.recording.rig import Rig
+from acquisition.recording.samples import POSITION, SEAT
+from calibrate.diagnose.outlying_rows import (
+    FEWEST_ROWS,
+    alone,
+    behind_gap,
+    lasting,
+)
+from calibrate.diagnose.state.session import Session, session_of
+from calibrate.fit.gross_errors.bad_rows import bad_rows
+from calibrate.fit.identify.clean import refuse_most, rows_of
+from calibrate.fit.identify.identify import impossible_rows, wrong_file
+from calibrate.fit.identify.rounds import distances, wary_fit
+from calibrate.fit.identify.session import columns_of, shots_of
+from calibrate.model.alignment import rigid_motion
+from calibrate.model.arms.catalogue import arm_of
+from calibrate.model.checks.gross_error import Blunder, BlunderKind
+from calibrate.model.checks.other_session import sessions_apart
+from calibrate.model.checks.rough_fit import rough_fit
+from calibrate.model.checks.same_posture import err_alike, postures
+from calibrate.model.checks.shots import Shots
+from calibrate.model.checks.witness import by_target
+from calibrate.model.effects.moved import LIMIT
+from calibrate.model.measured import Measured
+from calibrate.model.parameters import start_values
+from calibrate.model.sensors.catalogue import kind_of
+from calibrate.model.sensors.encoder_difference import NAME as ENCODER_DIFFERENCE
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.intp]
+
+PASSES = 2  # a row can hide behind a worse one
+PLACES = ("placement", SEAT)
+
+
+@dataclass(frozen=True)
+class Cleared:
+    """What may be diagnosed. `rows` (sample,) of the file; empty where the whole file is wrong."""
+
+    samples: Samples
+    rows: Ints
+    blunders: tuple[Blunder, ...]
+
+    @property
+    def whole_file(self) -> bool:
+        """Whether there is nothing to diagnose before the file is put right."""
+        return any(blunder.whole_file for blunder in self.blunders)
+
+
+def blunders_first(rig: Rig, samples: Samples) -> Cleared:
+    """DataError where the samples hold no observation, or where so many rows are bad that none can be trusted."""
+    if wrong := wrong_file(rig, samples):
+        return Cleared(samples, np.zeros(0, dtype=np.intp), wrong)
+    blunders = [*impossible_rows(rig, samples), *_joined(rig, samples)]
+    kept = _kept(samples, blunders)
+    for _ in range(PASSES):
+        found = [_counted(blunder, kept) for blunder in _wild(session_of(rig, samples.take(kept)))]
+        if not found:
+            break
+        blunders += found
+        kept = _kept(samples, blunders)
+    return Cleared(samples.take(kept), kept, tuple(blunders))
+
+
+def place_of(samples: Samples) -> Ints:
+    """(sample,) where fixture or probe stood; -1 where neither is recorded."""
+    for name in PLACES:
+        if name in samples:
+            return samples.integers(name, -1).astype(np.intp)
+    return np.full(len(samples), -1, dtype=np.intp)
+
+
+def _kept(samples: Samples, blunders: list[Blunder]) -> Ints:
+    refuse_most(tuple(blunders), len(samples)) if blunders else None
+    return np.setdiff1d(np.arange(len(samples)), rows_of(blunders))
+
+
+def _counted(blunder: Blunder, kept: Ints) -> Blunder:
+    """Rows of the file instead of rows of what was kept."""
+    return replace(blunder, rows=tuple(int(kept[row]) for row in blunder.rows))
+
+
+def _joined(rig: Rig, samples: Samples) -> list[Blunder]:
+    """Blocks of positions in a frame so far off that nothing was bumped: another session."""
+    if POSITION[0] not in samples:
+        return []
+    positions = np.stack([samples.column(c) for c in POSITION], axis=1)
+    rows = np.flatnonzero(np.isfinite(positions[:, 0]))
+    arm = arm_of(rig)
+    flange = arm.flange(start_values(arm.parameters), samples.joints()[rows])
+    out: list[Blunder] = []
+    for theirs, point in by_target(rig, samples, rows):
+        out += _joined_among(flange[np.searchsorted(rows, theirs)], positions[theirs], point, theirs)
+    return out
+
+
+def _joined_among(flange: Floats, positions: Floats, point: Floats | None, rows: NDArray[np.intp]) -> list[Blunder]:
+    """Of one target: flange poses (row, 4, 4) nominal, positions (row, 3) of these rows, its point (3,)."""
+    found = sessions_apart(flange, positions, point, rows)
+    if not found:
+        return []
+    rough = rough_fit(flange, positions, np.zeros(3) if point is None else point)
+    tips = flange[:, :3, :3] @ rough.point_m + flange[:, :3, 3]
+    expected = tips @ rough.linear.T + rough.shift_m
+    return [b for b in found if _elsewhere(expected, positions, np.isin(rows, b.rows))]
+
+
+def _elsewhere(expected: Floats, observed: Floats, block: NDArray[np.bool_]) -> bool:
+    T_observed_expected = rigid_motion(observed[block], expected[block])
+    linear, shift_m = T_observed_expected[:3, :3], T_observed_expected[:3, 3]
+    middle = expected[block].mean(axis=0)
+    moved_m = float(np.linalg.norm(linear @ middle + shift_m - middle))
+    return max(moved_m, float(Rotation.from_matrix(linear).magnitude())) > LIMIT
+
+
+def _wild(session: Session) -> list[Blunder]:
+    """Single rows, and blocks farther off than a bump; rows count in the session's samples."""
+    theta = wary_fit(session.weighting, session.start)
+    problem = session.weighting.problem(theta)
+    place = place_of(session.samples)
+    out: list[Blunder] = []
+    every = zip(session.measured, distances(problem, theta), strict=False)  # known lengths come last and are no rows
+    for index, (measured, distance) in enumerate(every):
+        if measured.problem.rows < FEWEST_ROWS or measured.name == ENCODER_DIFFERENCE:
+            continue
+        k = measured.problem.observed.shape[1]
+        own = problem.of_block(index, theta)
+        here = place[measured.sample_rows[:, -1]]
+        single = alone(distance, k, here)
+        away_m = np.linalg.norm(measured.problem.misfit(own)[:, :3], axis=1)
+        shots = shots_of(measured, own)
+        if shots is None:
+            out += [_pair(measured, int(i), float(away_m[i])) for i in single]
+            continue
+        out += bad_rows(shots, single)
+        block = lasting_rows(behind_gap(distance, k), here, shots)
+        out += _blocks(measured, block, away_m, _limit_m(session, measured))
+    return out
+
+
+def lasting_rows(apart: NDArray[np.bool_], place: Ints, shots: Shots) -> Ints:
+    """Of the rows that are `apart` (row,) those that follow one another, and whose neighbours in posture at other times
+    do not err alike.
+    """
+    block = np.flatnonzero(apart & lasting(apart, place))
+    if len(block) == 0:
+        return block
+    others = ~np.isin(np.arange(len(apart)), block)
+    return block[~err_alike(shots.misfit(), postures(shots.q_rad), block, others)]
+
+
+def _blocks(measured: Measured, block: Ints, away_m: Floats, limit_m: float) -> list[Blunder]:
+    """Rows that follow one another, all farther off than a bump moves anything."""
+    if len(block) == 0 or float(np.median(away_m[block])) < limit_m:
+        return []
+    rows = tuple(sorted(int(r) for r in measured.sample_rows[block, -1]))
+    what = f"{1e3 * float(np.median(away_m[block])):.3g} mm from where all other rows have it"
+    remedy = "another session was joined here, or something was put elsewhere: diagnose them as a file of their own"
+    return [Blunder(BlunderKind.OTHER_SESSION, rows, ", ".join(columns_of(measured)), what, remedy)]
+
+
+def _limit_m(session: Session, measured: Measured) -> float:
+    """Beyond, no bump has moved a reading."""
+    return min(LIMIT, kind_of(measured.name).far_m(session.rig))
+
+
+def _pair(measured: Measured, i: int, away_m: float) -> Blunder:
+    """Of a pair of rows it is open which one is wrong."""
+    rows = tuple(sorted(int(r) for r in measured.sample_rows[i]))
+    what = f"{measured.name} {1e3 * away_m:.3g} mm away from what all other rows predict"
+    return Blunder(BlunderKind.BAD_SHOT, rows, ", ".join(columns_of(measured)), what, "take both again, or remove them")

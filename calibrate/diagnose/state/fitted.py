@@ -1,0 +1,426 @@
+"""A session with geometry and terms fitted together: robust, with the noise that the residuals show.
+
+Weights and least squares take turns (calibrate/fit/noise/scatter.py); drivers that the model predicts are refreshed in
+between. Where several rows are distrusted, a new term that could make them so is tried from unit weights, too: data of
+a moved seat resemble outliers to the model before it.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calibrate.diagnose.state.assumed import Assumed
+from calibrate.diagnose.state.augmented import Around, Augmented, plain_sizes
+from calibrate.diagnose.state.in_sight import in_sight, solve_in_sight
+from calibrate.diagnose.state.linearised import Rows, Unseen
+from calibrate.diagnose.state.noise_of_fit import (
+    Noise,
+    covariance_at,
+    noise_of,
+    whiteners_of,
+)
+from calibrate.diagnose.state.session import Session, drivers_of
+from calibrate.fit.identify.session import believed_sigma
+from calibrate.fit.noise.scatter import Scatter, likelihood_of
+from calibrate.fit.solvers import (
+    FAR_START,
+    NEAR_START,
+    Loss,
+    Stop,
+    solve,
+)
+from calibrate.model.effects.catalogue import Listed
+from calibrate.model.effects.drivers import Drivers
+from calibrate.model.effects.form import Form
+from calibrate.model.effects.ports import Port
+from calibrate.model.effects.since_model import changes
+from calibrate.model.effects.term import Accepted, Term
+from calibrate.model.effects.time_laws import FEWEST_AFTER
+from calibrate.model.parameters import (
+    Parameter,
+    plausible_sizes,
+    priors,
+    start_values,
+)
+from calibrate.model.problem import whitener_of
+from calibrate.model.sensors import point_line, seat
+from calibrate.model.with_effects.driver_values import as_before
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.intp]
+
+TURNS = 40  # of weights and least squares; most settle in 5 to 8
+FEWEST_TURNS = 4
+REFRESHED = 2  # turns after which drivers have settled: what a nanometre changes in them decides nothing
+STEPS = 12  # of a solver in a turn: the next one goes on from there
+TOLERANCE = 0.02  # of chi2 in a turn: less than what settles the likelihood
+LAST = 1e-3  # the same in the turn that ends a fit, 3 % of a sigma
+DAMPING = 1e-9  # of the first step: along what the data see it is a Gauss-Newton step
+WILD = 0.1  # weight of a row that may have bent a plain fit
+SWALLOWED = 0.3  # weight of a row that next to nothing of a model follows: five sigmas off
+SETTLED = 0.1  # of -2 log L: far below any difference that decides
+CREEPING = SETTLED / TURNS  # the same in a turn: as many as there are would not bring it beyond that
+AT_REST = (Stop.GAIN, Stop.ROUNDING)  # of a solver that found the least squares of its weights
+PLACES = ("placement", seat.POINTS, point_line.POINTS)  # of where something stood; a place may be met unseen
+
+
+@dataclass(frozen=True, eq=False)
+class Fitted:
+    """State of calibrate/diagnose/state/linearised.py."""
+
+    session: Session
+    active: Ints  # samples that the fit sees, sorted
+    problem: Augmented
+    values: Floats  # of the problem's parameters
+    noise: Noise  # of each instrument, over its active rows
+    covariance: Floats  # (value, value) posterior; zero for held ones
+    steps: int = 0  # of the solver, in all rounds of weights
+    stop: Stop = Stop.ROUNDS  # the rule that ended the last round
+    before: Listed | None = None  # of the state that this one was refitted from
+
+    @cached_property
+    def _split(self) -> tuple[Floats, tuple[Accepted, ...]]:
+        return self.problem.split(self.values)
+
+    @property
+    def geometry(self) -> Floats:
+        """(param,) values of session.parameters."""
+        return self._split[0]
+
+    @property
+    def accepted(self) -> tuple[Accepted, ...]:
+        return self._split[1][self.problem.given :]
+
+    @property
+    def brought(self) -> tuple[Accepted, ...]:
+        """Terms of the model beside which this is sought."""
+        return self._split[1][: self.problem.given]
+
+    @property
+    def scatters(self) -> tuple[Scatter, ...]:
+        """Of each instrument, over its active rows: of what it does not share with another."""
+        return self.noise.scatters
+
+    @property
+    def samples(self) -> int:
+        return len(self.active)
+
+    @property
+    def distrusted(self) -> int:
+        return sum(int(np.sum(s.weights < SWALLOWED)) for s in self.scatters)
+
+    def trusting(self) -> "Fitted":
+        noise = self.noise.trusted
+        return replace(self, problem=noise.under(self.problem), noise=noise)
+
+    @cached_property
+    def around(self) -> Around:
+        """Frames and expected readings of all samples, active or not."""
+        return self.problem.around(self.values)
+
+    @property
+    def drivers(self) -> Drivers:
+        """As this state predicts them, or those that it was fitted with where they are hardly others."""
+        return self._drivers
+
+    @cached_property
+    def _drivers(self) -> Drivers:
+        last = self.problem.drivers
+        return last if last is not None and as_before(last, self.predicted) else self.predicted
+
+    @cached_property
+    def predicted(self) -> Drivers:
+        """Drivers at these very values."""
+        joint, session = self.session.weighting.unweighted, self.session
+        expected = {m.name: e for m, e in zip(session.measured, self.around.expected, strict=True)}
+        own = {m.name: joint.of_block(i, self.geometry) for i, m in enumerate(session.measured)}
+        return drivers_of(session, self.around.frames, expected, own)
+
+    @cached_property
+    def listed(self) -> Listed:
+        """The catalogue at these drivers."""
+        kept = self.before
+        return kept if kept is not None and kept.drivers is self.drivers else Listed(self.drivers)
+
+    @property
+    def rows(self) -> Rows:
+        return self._rows
+
+    @cached_property
+    def _rows(self) -> Rows:
+        parameters = self.problem.parameters
+        free = np.flatnonzero([p.free for p in parameters])
+        believed = free[np.isfinite(priors(parameters)[free])]
+        scale, sigma = plausible_sizes(parameters), priors(parameters)
+        blocks = sum(block.rows for block in self.session.weighting.known)
+        assumed = 0 if self.problem.assumed is None else len(self.problem.assumed.root)
+        known = blocks + assumed
+        residual = np.concatenate(
+            [-self.problem.residual(self.values), -(self.values - start_values(parameters))[believed] / sigma[believed]]
+        )
+        beliefs = np.zeros((len(believed), len(free)))
+        beliefs[range(len(believed)), np.searchsorted(free, believed)] = scale[believed] / sigma[believed]
+        slope = self.problem.forgetting().jacobian(self.values)[:, free] * scale[free]
+        none = np.full(known + len(believed), -1, dtype=np.intp)
+        labels = [np.concatenate([x, none]) for x in self._labels]
+        stated = len(self._labels[0]) + blocks + np.arange(assumed)
+        return Rows(residual, np.concatenate([slope, beliefs]), *labels, owner=self.problem.owner[free], stated=stated)
+
+    @cached_property
+    def _labels(self) -> tuple[Ints, Ints, Ints]:
+        """Of the data rows: sample, group, instrument."""
+        sample, group, instrument = [], [], []
+        seen = 0
+        for i, (m, rows) in enumerate(zip(self.session.measured, self.problem.rows, strict=True)):
+            k = m.problem.observed.shape[1]
+            sample.append(np.repeat(m.sample_rows[rows, -1], k))
+            group.append(np.repeat(np.arange(seen, seen + len(rows)), k))
+            instrument.append(np.full(len(rows) * k, i))
+            seen += len(rows)
+        return np.concatenate(sample), np.concatenate(group), np.concatenate(instrument)
+
+    @property
+    def minus_two_log_likelihood(self) -> float:
+        return self._minus_two_log_likelihood
+
+    @cached_property
+    def _minus_two_log_likelihood(self) -> float:
+        parameters = self.problem.parameters[: len(self.session.parameters)]
+        sigma = priors(parameters)
+        believed = np.isfinite(sigma) & np.array([p.free for p in parameters])
+        away = (self.geometry - start_values(parameters))[believed] / sigma[believed]
+        known = self.problem.residual(self.values)[len(self._labels[0]) :]
+        return sum(s.minus_two_log_likelihood for s in self.scatters) + float(away @ away + known @ known)
+
+    def columns(self, term: Term, inner: Floats) -> Floats:
+        data = [part.reshape(-1, part.shape[-1]) for part in self._felt(term, inner)]
+        rest = len(self.rows.residual) - len(self._labels[0])
+        return np.concatenate([*data, np.zeros((rest, data[0].shape[1]))])
+
+    def _felt(self, term: Term, inner: Floats) -> Sequence[Floats]:
+        """Of each instrument (active row, k, m) whitened, what a term adds.
+
+        A search asks for thousands: where a row follows one sample alone, by what each direction of the port does.
+        """
+        problem, drivers, samples = self.problem, self.drivers, self._followed
+        if samples is None:
+            return problem.whitened(problem.columns(term.port, term.basis(drivers, inner), self.around))
+        directions = term.along(drivers) if isinstance(term, Form) else None
+        if not isinstance(term, Form) or directions is None:
+            basis = term.basis(drivers, inner)
+            levers = self._lever(term.port, np.eye(basis.shape[1]))
+            return [lever @ basis[sample] for lever, sample in zip(levers, samples, strict=True)]
+        values, levers = self.listed.function(term, inner), self._lever(term.port, directions)
+        return [
+            (lever[:, :, None, :] * values[sample][:, None, :, None]).reshape(*lever.shape[:2], -1)
+            for lever, sample in zip(levers, samples, strict=True)
+        ]
+
+    @cached_property
+    def _followed(self) -> list[Ints] | None:
+        """Of each instrument (active row,) the sample that it follows; None where one follows several."""
+        measured = self.session.measured
+        if self.problem.shared is not None or any(m.sample_rows.shape[1] > 1 for m in measured):
+            return None
+        return [m.sample_rows[rows, 0] for m, rows in zip(measured, self.problem.rows, strict=True)]
+
+    def _lever(self, port: Port, directions: Floats) -> list[Floats]:
+        """Of each instrument (active row, k, d) whitened, what directions (width, d) of a port do."""
+        key = (port, directions.tobytes())
+        if key not in self._levers:
+            each = np.broadcast_to(directions, (len(self.around.frames), *directions.shape))
+            self._levers[key] = self.problem.whitened(self.problem.columns(port, each, self.around))
+        return self._levers[key]
+
+    @cached_property
+    def _levers(self) -> dict[tuple[Port, bytes], list[Floats]]:
+        return {}
+
+    def candidates(self) -> Sequence[Term]:
+        return self._candidates
+
+    @cached_property
+    def _candidates(self) -> tuple[Term, ...]:
+        """Closed and open menus and the ports ask for them in turn."""
+        assumed, every = self.problem.assumed, self.listed.terms
+        if assumed is None:
+            return every
+        if assumed.of_difference:
+            every = tuple(term.of_a_difference() if isinstance(term, Form) else term for term in every)
+        return (*every, *changes(self.drivers))
+
+    def refitted(self, accepted: Sequence[Accepted]) -> "Fitted":
+        kept, swallowed = {a.term.key for a in self.accepted}, self.distrusted >= FEWEST_AFTER
+        fits = [self._refitted(tuple(accepted), self.noise)]
+        if swallowed and any(a.term.key not in kept and _makes_outliers(a.term) for a in accepted):
+            fits.append(self._refitted(tuple(accepted), self.noise.trusted))
+        return replace(min(fits, key=lambda fit: fit.minus_two_log_likelihood), before=self.listed)
+
+    def renewed(self) -> "Fitted":
+        return _settled(self, renewing=True)
+
+    def select(self, samples: Ints) -> "Fitted":
+        return _cut(self, np.sort(samples))
+
+    def held_out(self, samples: Ints) -> tuple[Unseen, ...]:
+        rows = _rows_of(self.session, np.sort(samples))
+        moved = places_found(self.problem, self.values, self.scatters, rows, len(self._labels[0]))
+        at = self.problem.around(moved)
+        misfits = [m.problem.observed - e for m, e in zip(self.session.measured, at.expected, strict=True)]
+        apart = misfits if self.noise.shared is None else self.noise.shared.apart(misfits)
+        out: list[Unseen] = []
+        for i, (m, r) in enumerate(zip(self.session.measured, rows, strict=True)):
+            if len(r) == 0 or len(self.problem.rows[i]) == 0:  # without a row in the fit its noise is unknown
+                continue
+            W = whitener_of(covariance_at(self.scatters[i], self.problem.rows[i], r))
+            out.append(Unseen(m.name, m.sample_rows[r, -1], misfits[i][r], np.einsum("nij,nj->ni", W, apart[i][r])))
+        return tuple(out)
+
+    def _refitted(self, accepted: tuple[Accepted, ...], noise: Noise) -> "Fitted":
+        given, assumed = self.problem.given, self.problem.assumed
+        terms = (*self._split[1][:given], *accepted)
+        drivers, whiteners, rows = self.drivers if terms else None, whiteners_of(noise.scatters), self.problem.rows
+        sizes = plain_sizes(self.session, terms, drivers, whiteners, rows)
+        problem = Augmented(self.session, terms, drivers, rows, whiteners, sizes, given, assumed)
+        problem = replace(problem, kept=list(self.problem.kept))
+        start = np.concatenate([self.geometry, problem.start[len(self.geometry) :]])
+        return _settled(_turn(problem, self.active, start, noise))
+
+
+def fit_geometry(session: Session, active: Ints | None = None) -> Fitted:
+    """Geometry alone, from the closed-form start; `active` samples only, all if None."""
+    chosen = np.arange(len(session.samples)) if active is None else np.sort(active)
+    rows = _rows_of(session, chosen)
+    unit = tuple(
+        np.eye(m.problem.observed.shape[1]) / believed_sigma(m)[r].mean()
+        for m, r in zip(session.measured, rows, strict=True)
+    )
+    whiteners = tuple(np.broadcast_to(W, (len(r), *W.shape)) for W, r in zip(unit, rows, strict=True))
+    problem = Augmented(session, (), None, rows, whiteners, ())
+    fits: list[Fitted] = []
+    for loss in (Loss.SQUARE, Loss.HUBER):
+        seen = in_sight(problem, session.start)
+        rough = solve_in_sight(problem, session.start, seen, damping=FAR_START, tolerance=TOLERANCE, loss=loss)
+        fits.append(_settled(_turn(problem, chosen, rough.theta, noise_of(problem, rough))))
+        if all(np.all(s.weights > WILD) for s in fits[0].scatters):
+            break
+    return min(fits, key=lambda fit: fit.minus_two_log_likelihood)
+
+
+def given(fit: Fitted) -> Fitted:
+    """The same fit, its terms from now on taken as geometry: a search asks what there is beside them."""
+    return replace(fit, problem=replace(fit.problem, given=len(fit.problem.terms)))
+
+
+def fit_from_model(
+    session: Session, geometry: Fitted, terms: tuple[Accepted, ...], assumed: Assumed, start: Floats, unit: Floats
+) -> Fitted:
+    """A recording under what a model states of it, from `start` (value,). `geometry`: the same recording, alone.
+
+    `unit` (assumed value,): a step over which readings are linear.
+    """
+    noise = geometry.noise.trusted
+    whiteners, rows = whiteners_of(noise.scatters), geometry.problem.rows
+    sizes = plain_sizes(session, terms, geometry.drivers, whiteners, rows)
+    problem = noise.under(Augmented(session, terms, geometry.drivers, rows, whiteners, sizes, len(terms)))
+    free = np.flatnonzero([p.free for p in problem.parameters])
+    near = assumed.held_near(problem.jacobian(start), np.setdiff1d(free, assumed.at), unit)
+    return _settled(_turn(replace(problem, assumed=near), geometry.active, start, noise))
+
+
+def _makes_outliers(term: Term) -> bool:
+    """Whether data without the term may resemble gross errors: few of them follow it."""
+    return term.slow or term.open
+
+
+def _settled(fitted: Fitted, renewing: bool = False) -> Fitted:
+    """Weights and least squares in turns, until the solver is at rest and the likelihood changes no more; not settled,
+    but no longer either, where a turn changes it so little that all turns together would decide nothing.
+
+    Of turns that differ in what they take noise for, the likeliest: no refit ends worse than it was. Derivatives may be
+    kept from turn to turn, but the turn that ends it begins with those of its own values. `renewing`: with drivers as
+    every turn predicts them, the last one as good as its own, which a likelier turn under others would not be.
+    """
+    best, resting = fitted, False
+    for turn in range(1, TURNS):
+        last, problem = fitted, fitted.problem
+        anew = resting or turn + 1 == FEWEST_TURNS
+        problem = problem.forgetting() if anew else problem
+        if fitted.problem.terms and (renewing or turn <= REFRESHED):
+            problem = problem.refreshed(last.predicted if renewing else last.drivers)
+        new = _turn(problem, fitted.active, fitted.values, fitted.noise, LAST if anew else TOLERANCE)
+        fitted = replace(new, steps=fitted.steps + new.steps)
+        best = fitted if renewing else min(best, fitted, key=lambda fit: fit.minus_two_log_likelihood)
+        gained = last.minus_two_log_likelihood - fitted.minus_two_log_likelihood
+        least = SETTLED if new.stop in AT_REST else CREEPING
+        resting = turn + 1 >= FEWEST_TURNS and abs(gained) < least
+        if resting and anew:
+            return replace(best, steps=fitted.steps, stop=Stop.LIKELIHOOD if new.stop in AT_REST else Stop.ROUNDS)
+    return replace(best, steps=fitted.steps, stop=Stop.ROUNDS)
+
+
+def _turn(problem: Augmented, active: Ints, start: Floats, noise: Noise, tolerance: float = TOLERANCE) -> Fitted:
+    """Least squares under the noise so far, along what the data see, then the noise that is left."""
+    problem = noise.under(problem)
+    seen = in_sight(problem, start)
+    fit = solve_in_sight(problem, start, seen, damping=DAMPING, max_steps=STEPS, tolerance=tolerance)
+    noise = noise_of(problem, fit)
+    return Fitted(problem.session, active, problem, fit.theta, noise, fit.covariance, fit.steps, fit.stop)
+
+
+def _cut(state: Fitted, active: Ints) -> Fitted:
+    rows, shared = _rows_of(state.session, active), state.noise.shared
+    each = zip(state.session.measured, state.around.expected, strict=True)
+    misfits = [m.problem.observed - expected for m, expected in each]
+    apart = misfits if shared is None else shared.apart(misfits)
+    scatters: list[Scatter] = []
+    for i, r in enumerate(rows):
+        covariance = covariance_at(state.scatters[i], state.problem.rows[i], r)
+        value, weights = likelihood_of(apart[i][r], covariance)
+        scatters.append(Scatter(covariance, weights, value, state.scatters[i].free))
+    noise = Noise(tuple(scatters), shared)
+    problem = replace(noise.under(state.problem), rows=rows, last=dict(state.problem.last), slopes={}, added={})
+    problem = replace(problem, kept=list(problem.kept))
+    return replace(state, active=active, problem=problem, noise=noise)
+
+
+def _rows_of(session: Session, active: Ints) -> tuple[Ints, ...]:
+    return tuple(np.flatnonzero(np.isin(m.sample_rows, active).all(axis=1)) for m in session.measured)
+
+
+def places_found(
+    problem: Augmented, values: Floats, scatters: tuple[Scatter, ...], rows: tuple[Ints, ...], data_rows: int
+) -> Floats:
+    """Values in which places that the fit has not met are found from these rows of each instrument, all else held.
+
+    `data_rows`: of the problem's own rows, those of readings.
+    """
+    parameters = problem.parameters
+    place = np.array([p.free and p.name.startswith(PLACES) for p in parameters])
+    met = np.any(problem.jacobian(values)[:data_rows] != 0.0, axis=0)
+    unmet = place & ~met
+    if not unmet.any():
+        return values
+    whiteners = tuple(
+        whitener_of(covariance_at(s, old, r)) for s, old, r in zip(scatters, problem.rows, rows, strict=True)
+    )
+    held = tuple(p if u else replace(p, free=False) for p, u in zip(parameters, unmet, strict=True))
+    there = replace(problem, rows=rows, whiteners=whiteners, last={}, slopes={}, kept=[], added={})
+    return solve(_Held(there, held), start=values, damping=NEAR_START).theta
+
+
+@dataclass(frozen=True, eq=False)
+class _Held:
+    """A problem with other priors."""
+
+    problem: Augmented
+    parameters: tuple[Parameter, ...]
+
+    def residual(self, theta: Floats) -> Floats:
+        return self.problem.residual(theta)
+
+    def jacobian(self, theta: Floats) -> Floats:
+        return self.problem.jacobian(theta)

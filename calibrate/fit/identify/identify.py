@@ -1,0 +1,186 @@
+"""Identification of an arm from any session: gross errors first, then rank, then numbers with their uncertainty.
+
+A fault of the whole file (angles in degrees, a mirrored axis, ...) is refused by name; bad rows are named and left out.
+docs/decisions/0003 states why rank comes before numbers and why the noise is estimated.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+from msgspec import structs
+from numpy.random import Generator
+from numpy.typing import NDArray
+
+from acquisition.recording import Samples
+from acquisition.recording.files.bounds import ARM_M
+from acquisition.recording.rig import ArmModel, Rig
+from acquisition.recording.samples import POSITION
+from calibrate.errors import DataError
+from calibrate.fit.estimator import Estimator
+from calibrate.fit.fit_plan import DEFAULT, BesideName, FitPlan
+from calibrate.fit.gross_errors.conventions import wrong_convention, wrong_table
+from calibrate.fit.gross_errors.degrees import as_radians, beyond_limits
+from calibrate.fit.gross_errors.of_the_table import duplicated_rows, left_alone, rows_beyond_limits
+from calibrate.fit.identify.clean import clean, refuse_most, rows_of
+from calibrate.fit.identify.evidence import Asked
+from calibrate.fit.identify.fit_report import result_of
+from calibrate.fit.identify.planned import rig_as_planned, samples_as_planned
+from calibrate.fit.identify.point_constraint import point_constraints
+from calibrate.fit.identify.result import Identification
+from calibrate.fit.identify.rounds import coarse_start, settled_fit
+from calibrate.fit.identify.session import instruments_for_fit, standing_at
+from calibrate.fit.identify.spot_signs import mirrored_axes
+from calibrate.fit.identify.unseen_rows import Splitting
+from calibrate.fit.instruments import Instruments
+from calibrate.fit.weighting import Weighting
+from calibrate.model.arms.catalogue import arm_of
+from calibrate.model.checks.gross_error import Blunder
+from calibrate.model.checks.other_session import sessions_apart
+from calibrate.model.checks.witness import Witness, by_target
+from calibrate.model.parameters import start_values
+from calibrate.model.sensors.catalogue import witnesses_of
+
+Floats = NDArray[np.float64]
+
+CONFUSED = {ArmModel.DH: ArmModel.MDH, ArmModel.MDH: ArmModel.DH}
+
+
+def identify(
+    rig: Rig,
+    samples: Samples,
+    *,
+    rng: Generator,
+    held_out_share: float | None = None,
+    bootstrap_rounds: int | None = None,
+    plan: FitPlan = DEFAULT,
+) -> Identification:
+    """Everything about the arm that these samples determine, by all instruments whose columns they have, as the plan
+    states.
+
+    `held_out_share` of the rows, drawn by `rng`, are predicted from the others (0: no held-out proof), and
+    `bootstrap_rounds` fits are made to drawn rows; None: as the plan states. DataError where there is nothing to fit,
+    where the whole file is wrong, or where the plan asks for what rig or samples do not have.
+    """
+    rig, samples = rig_as_planned(rig, plan), samples_as_planned(samples, plan)
+    weighting, start, blunders = without_blunders(rig, samples, plan)
+    by = Estimator(plan.algorithm, plan.robust_loss, plan.rules)
+    fitted = settled_fit(weighting, coarse_start(weighting, start), plan.of_redundant, by)
+    share = plan.share if held_out_share is None else held_out_share
+    rounds = plan.bootstrap if bootstrap_rounds is None else bootstrap_rounds
+    asked = Asked(Splitting(share, plan.splits), rounds)
+    result = result_of(fitted, blunders, rig, samples, asked=asked, rng=rng)
+    if plan.method is not BesideName.POINT_CONSTRAINT:
+        return result
+    kept = np.setdiff1d(np.arange(len(samples)), rows_of(blunders))
+    return replace(result, point_constraints=point_constraints(rig, samples.take(kept)))
+
+
+def without_blunders(
+    rig: Rig, samples: Samples, plan: FitPlan = DEFAULT
+) -> tuple[Weighting, Floats, tuple[Blunder, ...]]:
+    """What can be averaged, a start for it, and what was wrong with the rows left out. DataError as of `identify`."""
+    refuse_wrong_file(rig, samples)
+    early = _with_left_alone(samples, (*impossible_rows(rig, samples), *_sessions_apart(rig, samples)))
+    instruments = _instruments_without(rig, samples, early, plan)
+    _refuse_positions(instruments)
+    weighting, late = clean(instruments.weighting, coarse_start(instruments.weighting, instruments.start))
+    every = _with_left_alone(samples, early + late)
+    if len(every) > len(early) + len(late):
+        weighting = weighting.take(np.setdiff1d(np.arange(len(samples)), rows_of(every)))
+    return weighting, instruments.start, every
+
+
+def refuse_wrong_file(rig: Rig, samples: Samples) -> None:
+    """DataError that names which conventions the file is written by, where they are not those of the rig."""
+    if blunders := wrong_file(rig, samples):
+        raise DataError("; besides, ".join(blunder.says for blunder in blunders))
+
+
+def _refuse_positions(instruments: Instruments) -> None:
+    """DataError where positions, too few for `wrong_file`, are in millimetres or fit only as their mirror image."""
+    if (found := instruments.alignment) is None:
+        return
+    if found.rms_m > ARM_M:
+        raise DataError(
+            f"all rows, columns {', '.join(POSITION)}: arm and positions are {found.rms_m:.3g} m apart wherever the "
+            "device stands: positions in millimetres; write metres (millimetres times 0.001)"
+        )
+    if not found.mirrored:
+        return
+    raise DataError(
+        f"all rows, columns {', '.join(POSITION)}: only the mirror image of the positions fits the arm "
+        f"({1e3 * found.mirrored_rms_m:.2g} mm, as written {1e3 * found.rms_m:.3g} mm): joints count against the rig's "
+        "sense, or a column of the device is negated; correct the signs (docs/formats.md, Joint signs), or measure "
+        "more poses to have the joints named"
+    )
+
+
+def wrong_file(rig: Rig, samples: Samples) -> tuple[Blunder, ...]:
+    """Conventions of the whole file that are not those of the rig."""
+    q_rad, limits_rad = samples.joints(), _limits_rad(rig)
+    in_degrees = beyond_limits(q_rad, limits_rad)
+    if in_degrees is not None:
+        q_rad = as_radians(q_rad, limits_rad)
+    witnesses = witnesses_of(rig, samples, q_rad)
+    found = _wrong_table(rig, witnesses) or wrong_convention(_drawn_flange(rig), witnesses)
+    if in_degrees is None and found is None:
+        found = mirrored_axes(rig, samples)
+    return tuple(blunder for blunder in (in_degrees, found) if blunder is not None)
+
+
+def _wrong_table(rig: Rig, witnesses: Sequence[Witness]) -> Blunder | None:
+    """The two ways to write a Denavit-Hartenberg table, which a data sheet hardly ever names."""
+    if (other := CONFUSED.get(rig.arm.model)) is None:
+        return None
+    by_other = structs.replace(rig, arm=structs.replace(rig.arm, model=other))
+    return wrong_table(_drawn_flange(rig), _drawn_flange(by_other), other.value, witnesses)
+
+
+def impossible_rows(rig: Rig, samples: Samples) -> tuple[Blunder, ...]:
+    """Rows that no instrument has to judge: copies, angles that the arm cannot have, and what shows nothing without."""
+    return _with_left_alone(samples, duplicated_rows(samples) + rows_beyond_limits(samples, _limits_rad(rig)))
+
+
+def _with_left_alone(samples: Samples, blunders: tuple[Blunder, ...]) -> tuple[Blunder, ...]:
+    return blunders + left_alone(samples, blunders)
+
+
+def _limits_rad(rig: Rig) -> Floats:
+    return np.array([[j.lower_rad, j.upper_rad] for j in rig.arm.joints])
+
+
+def _sessions_apart(rig: Rig, samples: Samples) -> tuple[Blunder, ...]:
+    if POSITION[0] not in samples:
+        return ()
+    rows, positions = _positions(samples)
+    flange = _drawn_flange(rig)(samples.joints()[rows])
+    return tuple(
+        blunder
+        for theirs, point in by_target(rig, samples, rows)
+        for own in [np.searchsorted(rows, theirs)]
+        for blunder in sessions_apart(flange[own], positions[own], point, theirs)
+    )
+
+
+def _instruments_without(rig: Rig, samples: Samples, blunders: tuple[Blunder, ...], plan: FitPlan) -> Instruments:
+    """The instruments without the rows of these gross errors; their rows count in the samples as given."""
+    if not blunders:
+        return instruments_for_fit(rig, samples, plan)
+    refuse_most(blunders, len(samples))
+    kept = np.setdiff1d(np.arange(len(samples)), rows_of(blunders))
+    found = instruments_for_fit(rig, samples.take(kept), plan)
+    return replace(found, weighting=standing_at(found.weighting, kept))
+
+
+def _positions(samples: Samples) -> tuple[NDArray[np.intp], Floats]:
+    """Rows that hold a position, and the positions (row, 3)."""
+    positions = np.stack([samples.column(c) for c in POSITION], axis=1)
+    rows = np.flatnonzero(np.isfinite(positions[:, 0]))
+    return rows, positions[rows]
+
+
+def _drawn_flange(rig: Rig) -> Callable[[Floats], Floats]:
+    """Angles (pose, joint) to (pose, 4, 4) of the nominal arm."""
+    arm = arm_of(rig)
+    return lambda q_rad: arm.flange(start_values(arm.parameters), q_rad)

@@ -1,0 +1,40 @@
+"""From the rig file to the dual-PSD chain that is fitted, and to the noise that is assumed."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition.recording.rig import Rig
+from calibrate.model.arms.catalogue import arm_of
+from calibrate.model.chain import Chain
+from calibrate.model.default_tolerance import links_of
+from calibrate.model.sensors.spots import dual_psd_of as dual_psd_of
+from calibrate.model.sensors.spots import fixture_of as fixture_of
+from calibrate.model.sensors.spots import laser_of as laser_of
+from calibrate.model.sensors.spots import psd_sigma_m
+
+JOINT_BELIEVED_RAD = (
+    1e-5  # 10 µm at 1 m reach: repeatability class of small arms (calibration data sheets: 0.01-0.03 mm)
+)
+
+
+@dataclass(frozen=True)
+class BelievedNoise:
+    """One sigma as the rig file states it; a start value only."""
+
+    joint_rad: float
+    psd_m: float  # of a spot, where the samples state none
+
+
+def dual_psd_chain(rig: Rig, placement: NDArray[np.int64], first_psd: NDArray[np.int64]) -> Chain:
+    """The rig's arm with its dual PSD, for poses with these placements and orders (pose,), (pose,).
+
+    Links and detectors as [tolerance] states them, without one as default_belief.py.
+    """
+    return Chain(arm_of(rig, links_of(rig)), dual_psd_of(rig, placement, first_psd))
+
+
+def believed_noise(rig: Rig) -> BelievedNoise:
+    """The rig's [noise]; what is missing there is a usual value, since the data decide anyway."""
+    return BelievedNoise(rig.noise.joint_rad or JOINT_BELIEVED_RAD, psd_sigma_m(rig))

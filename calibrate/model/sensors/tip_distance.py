@@ -1,0 +1,57 @@
+"""Instrument: the distance between the target at two poses, needing no frame: ball bars and relative distances.
+
+Source of the relative distance |P_n - P_(n-1)| as an observation: patent CN114523474B, step 4.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calibrate.model.parameters import Parameter
+from calibrate.model.placement.target import Target, point_by_twist
+from calibrate.model.sensor_model import About, Usage
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class TipDistance(Usage):
+    """Observed of a pair: |tip_b - tip_a| (m). Parameters: target 3."""
+
+    target: Target
+
+    unit = "m"
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        return self.target.parameters
+
+    def about(self) -> About:
+        return self.target.about()
+
+    def placed(self, about: About) -> Self:
+        return replace(self, target=self.target.placed(about))
+
+    def select(self, rows: NDArray[np.intp]) -> Self:
+        return self
+
+    def expect(self, phi: Floats, T_base_a: Floats, T_base_b: Floats) -> Floats:
+        return np.linalg.norm(self._span(phi, T_base_a, T_base_b), axis=1, keepdims=True)
+
+    def by_twists(self, phi: Floats, T_base_a: Floats, T_base_b: Floats) -> tuple[Floats, Floats]:
+        along = self._along(phi, T_base_a, T_base_b)
+        by_a = -along @ point_by_twist(self.target.in_base(phi, T_base_a))
+        return by_a, along @ point_by_twist(self.target.in_base(phi, T_base_b))
+
+    def by_parameter(self, phi: Floats, T_base_a: Floats, T_base_b: Floats) -> Floats:
+        return self._along(phi, T_base_a, T_base_b) @ (T_base_b[:, :3, :3] - T_base_a[:, :3, :3])
+
+    def _span(self, phi: Floats, T_base_a: Floats, T_base_b: Floats) -> Floats:
+        return self.target.in_base(phi, T_base_b) - self.target.in_base(phi, T_base_a)
+
+    def _along(self, phi: Floats, T_base_a: Floats, T_base_b: Floats) -> Floats:
+        """(pair, 1, 3) unit vector from a to b; nan where both are one point, which `pairs` never chooses."""
+        span = self._span(phi, T_base_a, T_base_b)
+        return (span / np.linalg.norm(span, axis=1, keepdims=True))[:, None]

@@ -1,0 +1,102 @@
+"""Every word that a diagnosis may say stands in the lists of docs/formats.md; those keep what was promised."""
+
+import re
+
+import numpy as np
+import pytest
+
+from calibrate.diagnose.doubts.findings import named
+from calibrate.diagnose.doubts.pulled_back import picture_driver
+from calibrate.diagnose.streams.continuity import Fault
+from calibrate.diagnose.streams.to_file import EXPLAINS, USUAL
+from calibrate.model.effects.catalogue import EFFECTS, missing_of, terms_of
+from calibrate.model.effects.causes import causes_of
+from calibrate.model.effects.term import Shape
+from simulators.conceal.wanted import FAMILIES
+
+from ..effects.conftest import full_session
+
+# Version 1 as it was published: names may be added, none may go.
+PROMISED = {
+    "Ports": "joint<i>.angle link<i>.length|offset|twist|tilt base.pose tool.point laser.direction laser.origin "
+    "fixture.pose psd1.reading psd2.reading device.reading device.pose seat.position time",
+    "Drivers": "q<i> first_psd previous_pose gravity_torque<i> overturning_moment approach<i> qd<i> last_move<i> "
+    "cmd_minus_q<i> t temp_<where> payload spot1 spot2 incidence1 incidence2 psd<k>_sum reading",
+    "Shapes": "constant linear quadratic cubic harmonic sign hysteresis exponential step product radial smooth",
+    "Physics": "encoder-eccentricity encoder-harmonic gear-transmission-error gear-ratio-error joint-coupling "
+    "joint-compliance payload-compliance backlash encoder-slip axis-wobble link-thermal-growth base-compliance "
+    "base-moved latency reading-lag tool-sag link-bending psd-nonlinearity psd-gain psd-ambient-light psd-cover-glass "
+    "laser-warm-up laser-thermal-drift fixture-moved device-scale device-drift device-periodic seat-moved not-settled "
+    "unknown",
+}
+PLACEHOLDERS = (("<i>", r"\d+"), ("<k>", r"\d+"), ("<where>", r"\w+"))
+
+
+@pytest.fixture(scope="module")
+def lists(request):
+    """Title -> the words of its list in the document."""
+    text = (request.config.rootpath / "docs" / "formats.md").read_text(encoding="utf-8")
+    found = re.findall(r"^\*\*(Ports|Drivers|Shapes|Physics)\*\*: (.*?)(?:\.\n)", text, re.M | re.S)
+    return {title: re.findall(r"`([^`]+)`", body) for title, body in found}
+
+
+def words_of(listed):
+    """One expression for all words of a list: `link<i>.length|offset` is link 1 to n, length or offset."""
+    each = []
+    for word in listed:
+        stem, dot, endings = word.rpartition(".")
+        pattern = re.escape(stem) + r"\." + f"(?:{endings})" if dot else re.escape(word)
+        for placeholder, digits in PLACEHOLDERS:
+            pattern = pattern.replace(re.escape(placeholder), digits)
+        each.append(pattern)
+    return re.compile("|".join(each))
+
+
+@pytest.fixture(params=FAMILIES)
+def drivers(request):
+    return full_session(request.param).drivers
+
+
+@pytest.mark.parametrize("title", PROMISED)
+def test_what_was_promised_is_still_there(lists, title):
+    assert set(PROMISED[title].split()) - {"harmonic"} <= {word for word in lists[title] if word != "order"}
+
+
+def test_every_cause_of_the_catalogue_has_published_words(lists, drivers):
+    ports, known, physics = (words_of(lists[title]) for title in ("Ports", "Drivers", "Physics"))
+    for term in terms_of(drivers):
+        name = named(term)
+        assert ports.fullmatch(name.where), name
+        assert physics.fullmatch(name.physics), name
+        assert name.shape in lists["Shapes"], name
+        for driver in ",".join(name.depends_on).split(","):
+            assert driver in drivers.extra or known.fullmatch(driver), name
+
+
+def test_every_driver_of_an_unknown_cause_has_a_published_word(lists, drivers):
+    known = words_of(lists["Drivers"])
+    assert all(name in drivers.extra or known.fullmatch(name) for name in causes_of(drivers))
+
+
+def test_what_was_not_recorded_is_named_by_a_published_driver(lists):
+    stems = {re.sub(r"(<\w+>)$|_<where>$", "", word) for word in lists["Drivers"]} | set(lists["Drivers"])
+    for family in FAMILIES:
+        for missing in missing_of(full_session(family).drivers):
+            assert missing.driver in stems or words_of(lists["Drivers"]).fullmatch(missing.driver), missing
+            assert missing.physics in lists["Physics"]
+
+
+def test_shapes_and_physics_are_the_published_ones(lists):
+    assert {shape.value for shape in Shape} == set(lists["Shapes"]) - {"order"}
+    assert {effect.physics for effect in EFFECTS} <= set(lists["Physics"])
+    assert {*EXPLAINS, *USUAL, *(fault.value for fault in Fault)} <= set(lists["Physics"])
+
+
+def test_every_driver_can_be_drawn(drivers):
+    """The picture of a finding has an axis with numbers, whatever its driver."""
+    for term in terms_of(drivers):
+        names = ",".join(named(term).depends_on).split(",")
+        said, values = picture_driver(drivers, names)
+        assert values.shape == (len(drivers.t_s),)
+        assert np.isfinite(values).any()
+        assert said in names, (term.key, said)

@@ -1,0 +1,66 @@
+"""Faults of a file are named before physics is sought, and what physics did is not taken for a fault."""
+
+import numpy as np
+import pytest
+
+from calibrate.diagnose.gross_errors_first import blunders_first
+from calibrate.errors import DataError
+from calibrate.model.checks.gross_error import BlunderKind
+
+from .concealed import changed, recording_of
+
+
+@pytest.fixture(scope="module")
+def healthy(tmp_path_factory):
+    return recording_of(tmp_path_factory.mktemp("tracker"), family="tracker", seed=21, samples=120, arm="irb120")
+
+
+def test_nothing_is_wrong_with_a_healthy_session(healthy):
+    cleared = blunders_first(healthy.rig, healthy.samples)
+    assert cleared.blunders == ()
+    np.testing.assert_array_equal(cleared.rows, np.arange(120))
+
+
+def test_a_wrong_digit_is_named_with_row_and_column(healthy):
+    x = healthy.samples.column("x_m").copy()
+    x[40] += 0.1
+    (found,) = blunders_first(healthy.rig, changed(healthy.samples, x_m=x)).blunders
+    assert (found.kind, found.rows, found.column) == (BlunderKind.WRONG_VALUE, (40,), "x_m")
+
+
+def test_rows_left_out_are_counted_as_in_the_file(healthy):
+    x = healthy.samples.column("x_m").copy()
+    x[40] += 0.1
+    twice = healthy.samples.take(np.sort(np.append(np.arange(120), 7)))
+    (copy, wrong) = blunders_first(healthy.rig, changed(twice, x_m=np.insert(x, 8, x[7]))).blunders
+    assert (copy.kind, copy.rows) == (BlunderKind.DUPLICATED_ROWS, (8,))
+    assert wrong.rows == (41,)
+
+
+@pytest.mark.parametrize("shift_m", [2e-4, 5e-3])
+def test_a_device_that_was_bumped_is_physics(healthy, shift_m):
+    y = healthy.samples.column("y_m").copy()
+    y[80:] += shift_m
+    assert blunders_first(healthy.rig, changed(healthy.samples, y_m=y)).blunders == ()
+
+
+def test_a_session_joined_to_another_is_a_fault(healthy):
+    y = healthy.samples.column("y_m").copy()
+    y[90:] += 0.3
+    found = blunders_first(healthy.rig, changed(healthy.samples, y_m=y)).blunders
+    assert {b.kind for b in found} == {BlunderKind.OTHER_SESSION}
+    assert {row for b in found for row in b.rows} == set(range(90, 120))
+
+
+def test_a_joint_counted_the_other_way_round_makes_the_whole_file_wrong(healthy):
+    turned = changed(healthy.samples, q3_rad=-healthy.samples.column("q3_rad"))
+    cleared = blunders_first(healthy.rig, turned)
+    assert cleared.whole_file
+    assert cleared.blunders[0].kind is BlunderKind.JOINT_SIGN
+    assert "q3" in cleared.blunders[0].column
+
+
+def test_half_a_file_of_impossible_rows_is_refused(healthy):
+    doubled = healthy.samples.take(np.repeat(np.arange(120), 2))
+    with pytest.raises(DataError, match="of 240 rows"):
+        blunders_first(healthy.rig, doubled)
