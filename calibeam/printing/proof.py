@@ -8,7 +8,6 @@ from calibeam.console import Console
 from calibeam.prove.record import CaseScore, ProofFile
 from calibeam.prove.tally import (
     OF_TROUBLES,
-    ProofFigure,
     Share,
     TallyLine,
     at_once,
@@ -17,10 +16,8 @@ from calibeam.prove.tally import (
     by_effect,
     by_enr,
     by_fault,
-    by_instrument,
     by_trouble,
     figures,
-    rivals,
 )
 
 
@@ -38,10 +35,6 @@ def print_proof(console: Console, proof: ProofFile) -> None:
     if troubles := by_trouble(cases):
         console.print(_troubles(troubles))
     console.print(_figures(cases))
-    console.print(_free_space(cases))
-    others = rivals(cases)
-    if others:
-        console.print(_shares(others))
     for case in cases:
         if case.error:
             console.print(f"{case.name}: {case.error}", markup=False, highlight=False)
@@ -72,28 +65,3 @@ def _figures(cases: Sequence[CaseScore]) -> Table:
     for figure in figures(cases):
         table.add_row(figure.label, figure.said, figure.wanted)
     return table
-
-
-def _free_space(cases: Sequence[CaseScore]) -> Table:
-    table = Table(
-        title="tool error over the workspace against the truth, medians of the cases that were compared",
-        title_justify="left",
-    )
-    for heading in ("", "cases", "geometry", "with what was found", "oracle"):
-        table.add_column(heading)
-    for line in by_instrument(cases):
-        table.add_row(line.label, str(line.cases), *map(_um, (line.geometry_m, line.found_m, line.oracle_m)))
-    return table
-
-
-def _shares(others: Sequence[ProofFigure]) -> Table:
-    table = Table(title="share of the oracle's held-out gain (1: all, 0: none)", title_justify="left")
-    for heading in ("", "median, p10"):
-        table.add_column(heading)
-    for figure in others:
-        table.add_row(figure.label, figure.said)
-    return table
-
-
-def _um(value: float | None) -> str:
-    return "-" if value is None else f"{1e6 * value:.3g} µm"
