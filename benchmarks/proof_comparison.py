@@ -14,7 +14,7 @@ from pathlib import Path
 import msgspec
 import numpy as np
 
-from calibeam.prove.comparison import DIAGNOSIS, WORTH, Compared, compare
+from benchmarks.proof_oracle import DIAGNOSIS, WORTH, Compared, compare
 from calibeam.prove.page import hidden_words
 from calibeam.prove.record import PLAIN, CaseScore, ProofFile, ProofRecord, truth_of
 from calibeam.prove.seal import Layout

@@ -7,7 +7,7 @@ import msgspec
 import pytest
 
 from benchmarks.proof_comparison import FILE, ComparisonFile, by_instrument, pairs_of, read_comparison, shares_of_oracle
-from calibeam.prove.comparison import Compared
+from benchmarks.proof_oracle import Compared
 from calibeam.prove.record import SCHEMA, CaseScore, DefectScore, ProofFile
 
 Case = Callable[..., CaseScore]

@@ -5,8 +5,8 @@ from collections.abc import Callable
 import pytest
 
 from benchmarks.proof_comparison import ComparisonFile
+from benchmarks.proof_oracle import DIAGNOSIS, GEOMETRY, BaselineScore, Compared
 from benchmarks.proof_table import BEGIN, END, table_of, wanted_words, with_table
-from calibeam.prove.comparison import DIAGNOSIS, GEOMETRY, BaselineScore, Compared
 from calibeam.prove.record import SCHEMA, CaseScore, DefectScore, ProofFile
 from calibeam.prove.tally import ProofFigure
 from calibrate.errors import DataError

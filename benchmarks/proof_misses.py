@@ -1,4 +1,4 @@
-"""`python -m calibeam.prove.misses FOLDER`: every case in which something went wrong, one line each."""
+"""`python -m benchmarks.proof_misses FOLDER`: every case in which something went wrong, one line each."""
 
 import sys
 from collections.abc import Iterator

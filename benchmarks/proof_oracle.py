@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.recording import read
-from calibeam.prove.baselines import Method, features, installed
+from benchmarks.proof_baselines import Method, features, installed
 from calibeam.prove.record import ProofRecord, TrueDefect, Truth
 from calibeam.prove.scoring import errors_m, same_place
 from calibeam.prove.unseen import read_asked, tool_at
