@@ -59,12 +59,13 @@ lint: $(READY)
 docs: $(READY)
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet --clean
 
-# The concealed proof, with the libraries that it is compared with: see docs/proof.md. A quarter of an hour on two cores; CASES=150: ten minutes.
+# The concealed proof, then an oracle and other methods on its cases: docs/proof.md. A quarter of an hour on two cores; CASES=150: ten minutes.
 prove: $(BENCH)/.ready
 	rm -rf out/proof
-	$(BENCH)/bin/calibeam prove --cases $(or $(CASES),220) --wire $(or $(WIRE),2) --compare 16 --publish --out out/proof
+	$(BENCH)/bin/calibeam prove --cases $(or $(CASES),220) --wire $(or $(WIRE),2) --publish --out out/proof
+	$(BENCH)/bin/python -m benchmarks.proof_comparison out/proof
 
-# Its table into the README: of the published seed only.
+# Its table into docs/figures.md: of the published seed only.
 prove-table: $(READY)
 	$(BIN)/python -m benchmarks.proof_table out/proof/proof.json docs/figures.md
 

@@ -31,6 +31,8 @@ from benchmarks import (
     log_cost,
     measuring_arm,
     plan_taken,
+    proof_comparison,
+    proof_misses,
     real_diagnosis,
     rtde_jitter,
     slices,
@@ -118,6 +120,16 @@ def run_real() -> None:
     print("real recordings: unseen blocks by the model files of identify and diagnose")
     for row in real_diagnosis.lines(RIG.parents[2] / "shared" / "data"):
         print(row, flush=True)
+
+
+def run_proof() -> None:
+    print("the cases of the last `make prove`: an oracle and other methods, and every fault of the diagnosis")
+    folder = RIG.parents[1] / "out" / "proof"
+    if not folder.is_dir():
+        print("no proof in out/proof; make one with `make prove`")
+        return
+    proof_comparison.main(folder)
+    proof_misses.main(folder)
 
 
 def run_diagnosis_speed() -> None:
@@ -262,6 +274,7 @@ BENCHMARKS: dict[str, Callable[[], None]] = {
     "errors": run_errors,
     "designed_poses": run_designed_poses,
     "real": run_real,
+    "proof": run_proof,
     "diagnosis_speed": run_diagnosis_speed,
     "measuring-arm": run_measuring_arm,
     "measuring-arm-bearings": run_perfect_bearings,

@@ -1,6 +1,6 @@
 """`python -m benchmarks.proof_table proof.json docs/figures.md`: the table of a proof, between two marks of a text.
 
-So that the table is never typed, and always that of a file.
+So that the table is never typed, and always that of a file; with what `benchmarks.proof_comparison` left beside it.
 """
 
 import re
@@ -11,47 +11,52 @@ from pathlib import Path
 
 import msgspec
 
+from benchmarks.proof_comparison import (
+    ComparisonFile,
+    by_instrument,
+    by_method,
+    oracle_figures,
+    pairs_of,
+    read_comparison,
+)
 from calibeam.prove.record import PLAIN, CaseScore, ProofFile
 from calibeam.prove.tally import (
     ProofFigure,
     TallyLine,
     at_once,
     by_enr,
-    by_instrument,
     figures,
     plain,
-    rivals,
 )
 from calibrate.errors import DataError
-from calibrate.quantities import length
 
 NUMBER = re.compile(r"\d+(?:\.\d+)?")
 BEGIN, END = "<!-- proof: begin -->", "<!-- proof: end -->"
 
 
-def table_of(proof: ProofFile) -> str:
+def table_of(proof: ProofFile, comparison: ComparisonFile) -> str:
     """Markdown. DataError for a proof that was not made to be published: no figure of it is for the public."""
     if proof.development or proof.without:
         why = f"seed {proof.seed} is reserved for development" if proof.development else "effects were taken out"
         raise DataError(f"{why}; publish the table of a `calibeam prove --publish`")
     if "--publish" not in proof.command.split():
         raise DataError("this proof was not made to be published; make it with `make prove`")
-    cases = proof.cases
+    cases, pairs = proof.cases, pairs_of(proof, comparison)
+    minutes = (proof.wall_s + comparison.wall_s) / 60
     lines = [
-        f"Seed {proof.seed}, {len(cases)} sessions, {proof.wall_s / 60:.0f} minutes (`make prove`); brackets are 95 %.",
+        f"Seed {proof.seed}, {len(cases)} sessions, {minutes:.0f} minutes (`make prove`); brackets are 95 %.",
         "",
         *_findings(cases),
         "",
         *_rows(
             ("uncertainty and proof", "measured", "wanted"),
-            [(f.label, f.said, wanted_words(f)) for f in figures(cases)],
+            [(f.label, f.said, wanted_words(f)) for f in (*figures(cases), *oracle_figures(pairs))],
         ),
     ]
-    others = rivals(cases)
-    if others:
+    if others := by_method(pairs):
         head = ("held-out gain, share of the oracle's", "median, p10")
         lines += ["", *_rows(head, [(f.label, f.said) for f in others])]
-    free = by_instrument(cases)
+    free = by_instrument(pairs)
     if free:
         head = (
             "tool error over the workspace against the truth, median",
@@ -60,8 +65,7 @@ def table_of(proof: ProofFile) -> str:
             "with what was found",
             "oracle",
         )
-        found = [(f.label, str(f.cases), length(f.geometry_m), length(f.found_m), length(f.oracle_m)) for f in free]
-        lines += ["", *_rows(head, found)]
+        lines += ["", *_rows(head, [f.cells for f in free])]
     return "\n".join(lines) + "\n"
 
 
@@ -124,7 +128,8 @@ def main(proof: Path, text: Path) -> None:
     """Writes the table into the text."""
     file = msgspec.json.decode(proof.read_bytes(), type=ProofFile)
     old = text.read_text(encoding="utf-8")
-    text.write_text(with_table(old, table_of(file), text.name), encoding="utf-8")
+    table = table_of(file, read_comparison(proof.parent))
+    text.write_text(with_table(old, table, text.name), encoding="utf-8")
 
 
 if __name__ == "__main__":

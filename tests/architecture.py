@@ -173,12 +173,12 @@ def figures() -> tuple[Figure, ...]:
 
 
 TODAY = {
-    "files": 812,  # docs/decisions/0042-what-is-promised.md
-    "code": 80_600,  # docs/decisions/0042-what-is-promised.md
-    "longest_function": 54,
-    "one_importer": 15,
+    "files": 807,  # docs/decisions/0042-what-is-promised.md
+    "code": 79_820,  # docs/decisions/0042-what-is-promised.md
+    "longest_function": 53,
+    "one_importer": 11,
     "classes": 26,
-    "file_names": 71,
+    "file_names": 69,
     "chain": 36,
 }
 

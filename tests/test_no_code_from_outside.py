@@ -23,7 +23,6 @@ METHODS = {
     ("yaml", "load"),
 }
 KEYWORDS = {"shell", "allow_pickle"}
-NAMES_A_SHELL = "generate_completion"  # of cyclopts: for which shell, not by which
 
 
 def forbidden(tree: ast.AST) -> Iterator[str]:
@@ -37,8 +36,6 @@ def forbidden(tree: ast.AST) -> Iterator[str]:
                 yield name
             case ast.Call(func=ast.Attribute(value=ast.Name(id=module), attr=name)) if (module, name) in METHODS:
                 yield f"{module}.{name}"
-            case ast.Call(func=ast.Attribute(attr=name)) if name == NAMES_A_SHELL:
-                pass
             case ast.Call(keywords=keywords):
                 yield from (f"{k.arg}=" for k in keywords if k.arg in KEYWORDS and not _is_false(k.value))
             case _:

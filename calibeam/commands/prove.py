@@ -1,17 +1,32 @@
 """`calibeam prove`: hide physics in emulated sessions, diagnose them blindly, open the seals, and count."""
 
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
 from cyclopts import Parameter
+from rich.table import Table
 
 from calibeam.console import Console
-from calibeam.printing.proof import print_proof
 from calibeam.prove.loop import prove_loop, summary
 from calibeam.prove.prove import Plan, prove
 from calibeam.prove.raised import TROUBLES
+from calibeam.prove.record import CaseScore, ProofFile
 from calibeam.prove.scenario import DEVELOPMENT, KINDS, Kind, Mix
+from calibeam.prove.tally import (
+    OF_TROUBLES,
+    Share,
+    TallyLine,
+    at_once,
+    between_encoders,
+    by,
+    by_effect,
+    by_enr,
+    by_fault,
+    by_trouble,
+    figures,
+)
 from calibrate.errors import DataError
 from simulators.conceal.wanted import FAMILIES, Family
 
@@ -31,7 +46,6 @@ def prove_command(
     jobs: int = 2,
     without: Annotated[tuple[str, ...], Parameter(show_default=False)] = (),
     wire: int = 0,
-    compare: int = 0,
     loop: Annotated[bool, Parameter(negative=())] = False,
     publish: bool = False,
     json: bool = False,
@@ -70,8 +84,6 @@ def prove_command(
         Physics to take out of the catalogue: then its cases have to be called unknown, at the right place.
     wire
         Further cases whose recordings come over emulated wires: a minute each, two cores.
-    compare
-        For how many cases an oracle, which knows the truth, and other methods are asked for comparison.
     loop
         Reconcile each case with the simulation of its rig file instead: how far off it is on unseen rows, before, after
         geometry and after physics. Takes --cases, --wire, --seed, --jobs and --out, and no other option.
@@ -97,12 +109,58 @@ def prove_command(
         raise DataError("a published table holds all kinds of cases; leave out --family, --kind, --enr and --mechanism")
     if cases < 1 or jobs < 1 or wire < 0:
         raise DataError(f"--cases {cases} --jobs {jobs} --wire {wire}: give 1 or more cases and jobs, wire 0 or more")
-    plan = Plan(mix, seed, cases, jobs, without, wire, compare)
+    plan = Plan(mix, seed, cases, jobs, without, wire)
     proof = prove(out, plan, lambda word: _tell(console, word), " ".join(["calibeam", *sys.argv[1:]]))
-    print_proof(console, proof)
+    _print_proof(console, proof)
     console.print(f"proof: {out / 'proof.json'}\npage: {out / 'proof.html'}", markup=False, highlight=False)
     if json:
         print(out / "proof.json")
+
+
+def _print_proof(console: Console, proof: ProofFile) -> None:
+    """All sums; each case stands in the file and on the page."""
+    cases = proof.cases
+    console.print(_lines("one hidden effect, by effect over noise", by_enr(cases)))
+    console.print(_lines("effect over noise >= 0.6, by instrument", by(cases, lambda c: c.family)))
+    console.print(_lines("effect over noise >= 0.6, by the way of the recording", by(cases, lambda c: c.path)))
+    console.print(_lines("several at once", [at_once(cases, "three"), at_once(cases, "eighteen")]))
+    console.print(_lines("effect over noise >= 0.6, by mechanism", by_effect(cases)))
+    console.print(_lines("faults of motion, stamps and second encoders, in streams", by_fault(cases)))
+    if found := between_encoders(cases):
+        console.print(_lines("between the two encoders of a joint", found))
+    if troubles := by_trouble(cases):
+        console.print(_troubles(troubles))
+    console.print(_figures(cases))
+    for case in cases:
+        if case.error:
+            console.print(f"{case.name}: {case.error}", markup=False, highlight=False)
+
+
+def _lines(title: str, lines: Sequence[TallyLine]) -> Table:
+    table = Table(title=title, title_justify="left")
+    for heading in ("", "n", "located", "named", "or among alternatives", "others reported, a case"):
+        table.add_column(heading)
+    for line in lines:
+        if line.located.n:
+            shares = (share.brief for share in line.shares)
+            table.add_row(line.label, str(line.located.n), *shares, line.others)
+    return table
+
+
+def _troubles(lines: Sequence[tuple[str, tuple[Share, ...]]]) -> Table:
+    table = Table("", *OF_TROUBLES, title="troubles that were met on real robots", title_justify="left")
+    for label, (count, *shares) in lines:
+        table.add_row(label, str(count.k), *(share.brief for share in shares))
+    return table
+
+
+def _figures(cases: Sequence[CaseScore]) -> Table:
+    table = Table(title="uncertainty and proof", title_justify="left")
+    for heading in ("", "measured", "wanted"):
+        table.add_column(heading)
+    for figure in figures(cases):
+        table.add_row(figure.label, figure.said, figure.wanted)
+    return table
 
 
 def _loop(console: Console, out: Path, counts: tuple[int, int], seed: int, jobs: int, *, json: bool) -> None:

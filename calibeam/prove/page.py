@@ -9,22 +9,18 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from numpy.typing import NDArray
 
-from calibeam.prove.misses import faults, hidden_briefly, hidden_words, said_words
 from calibeam.prove.record import PLAIN, UNKNOWN, CaseScore, ProofFile
 from calibeam.prove.tally import (
     NONE,
-    ProofFigure,
     TallyLine,
     at_once,
     by,
     by_effect,
     by_enr,
     by_fault,
-    by_instrument,
+    faults,
     figures,
-    oracle_share,
     plain,
-    rivals,
     share,
 )
 from calibrate.quantities import DASH, length
@@ -45,7 +41,7 @@ from calibrate.report.elements.tones import Tone
 
 def summary(cases: Sequence[CaseScore]) -> list[str]:
     """One sentence for each kind of case that there is."""
-    return [s for s in (_single(cases), _nothing(cases), _outside(cases), _gain(cases), _faulty(cases)) if s]
+    return [s for s in (_single(cases), _nothing(cases), _outside(cases), _faulty(cases)) if s]
 
 
 def _single(cases: Sequence[CaseScore]) -> str:
@@ -73,16 +69,6 @@ def _outside(cases: Sequence[CaseScore]) -> str:
     return (
         f"{len(strange)} mechanisms of no catalogue: located {found.brief}, given a wrong name with confidence "
         f"{wrong.brief}."
-    )
-
-
-def _gain(cases: Sequence[CaseScore]) -> str:
-    gains = [g for c in cases if (g := oracle_share(c)) is not None]
-    if not gains:
-        return ""
-    return (
-        f"On unseen samples of {len(gains)} cases the diagnosis removes {float(np.median(gains)):.2f} (median) of what "
-        "an oracle removes that knows the truth."
     )
 
 
@@ -169,7 +155,6 @@ CONTENTS = {
     "sums": "What was found",
     "doubt": "Uncertainty and proof",
     "confusion": "What is taken for what",
-    "others": "Other methods",
     "stories": "Each case",
     "repeat": "To repeat it",
 }
@@ -189,19 +174,10 @@ def proof_html(proof: ProofFile) -> str:
         _sums(cases),
         _doubt(cases),
         _confusion(cases),
-        _others(cases),
         _stories(cases),
         _repeat(proof),
     ]
-    kept = [(anchor, chapter) for anchor, chapter in zip(CONTENTS, chapters, strict=True) if chapter]
-    return page(
-        "The concealed proof",
-        _masthead(proof),
-        {anchor: CONTENTS[anchor] for anchor, _ in kept},
-        [chapter for _, chapter in kept],
-        proof.software,
-        kind="proof",
-    )
+    return page("The concealed proof", _masthead(proof), CONTENTS, chapters, proof.software, kind="proof")
 
 
 def _masthead(proof: ProofFile) -> Html:
@@ -240,18 +216,8 @@ def _sums(cases: Sequence[CaseScore]) -> Html:
 
 def _doubt(cases: Sequence[CaseScore]) -> Html:
     lead = "What is reported where nothing is hidden, and how sizes and errors compare with the truth."
-    said = _figures(("", "measured", "wanted"), [f for f in figures(cases) if f.said != NONE])
-    return section("doubt", CONTENTS["doubt"], lead, said, *_free_space(cases))
-
-
-def _free_space(cases: Sequence[CaseScore]) -> list[Html]:
-    found = [
-        (f.label, str(f.cases), length(f.geometry_m), length(f.found_m), length(f.oracle_m))
-        for f in by_instrument(cases)
-    ]
-    head = ("", "cases", "geometry", "with what was found", "oracle")
-    caption = "Tool error over the workspace against the truth: medians of the cases that were compared with the oracle"
-    return [table(head, found, numeric=(1, 2, 3, 4), caption=caption)] if found else []
+    said = table(("", "measured", "wanted"), [(f.label, f.said, f.wanted) for f in figures(cases) if f.said != NONE])
+    return section("doubt", CONTENTS["doubt"], lead, said)
 
 
 def _confusion(cases: Sequence[CaseScore]) -> Html:
@@ -260,34 +226,40 @@ def _confusion(cases: Sequence[CaseScore]) -> Html:
     return section("confusion", CONTENTS["confusion"], lead, drawing)
 
 
-def _others(cases: Sequence[CaseScore]) -> Html | None:
-    others = rivals(cases)
-    if not others:
-        return None
-    lead = (
-        "The same unseen samples, the same recordings. 1: all that an oracle removes, which knows the true terms and "
-        "has only their sizes to find; 0: no better than geometry alone."
-    )
-    said = [
-        (c.name, hidden_words(c), b.method, DASH if b.gain is None else f"{b.gain:.2f}", b.says)
-        for c in cases
-        for b in c.baselines
-    ]
-    answers = table(("case", "hidden", "method", "share", "where and why, as reported"), said, numeric=(3,))
-    return section(
-        "others",
-        CONTENTS["others"],
-        lead,
-        _figures(("", "median, p10"), others),
-        folded("What each of them reports of each case", answers),
-    )
-
-
 def _stories(cases: Sequence[CaseScore]) -> Html:
     lead = "Everything that was hidden and everything that was reported. Faults of the diagnosis first."
     wrong = [c for c in cases if faults(c)]
     right = [c for c in cases if not faults(c)]
     return section("stories", CONTENTS["stories"], lead, *map(_story, wrong), *map(_story, right))
+
+
+def hidden_words(case: CaseScore) -> str:
+    """All that the seal held."""
+    if not case.defects:
+        return f"nothing, {case.noise} noise"
+    each = [f"{d.mechanism} ({d.physics}) at {d.port}, {d.enr:.2g} x noise" for d in case.defects]
+    kept = f"; missing column: {', '.join(case.withheld)}" if case.withheld else ""
+    return ", ".join(each) + kept
+
+
+def hidden_briefly(case: CaseScore) -> str:
+    """The same for a heading: what, where, and how large the largest."""
+    match case.defects:
+        case ():
+            return f"nothing, {case.noise} noise"
+        case (only,):
+            kept = ", its column withheld" if case.withheld else ""
+            return f"{only.mechanism} at {only.port}, {only.enr:.2g} x noise{kept}"
+        case several:
+            return f"{len(several)} causes"
+
+
+def said_words(case: CaseScore) -> str:
+    """Verdict and findings."""
+    if not case.said:
+        return case.verdict
+    each = [f"{s.physics} at {s.where} by {s.depends_on or 'nothing recorded'} ({s.confidence:.2f})" for s in case.said]
+    return f"{case.verdict}: " + ", ".join(each)
 
 
 def _story(case: CaseScore) -> Html:
@@ -302,12 +274,11 @@ def _story(case: CaseScore) -> Html:
     lines += [s.says for s in case.said]
     lines.append(
         f"Unseen samples: {_m(case.held_out_before_m)} with geometry alone, {_m(case.held_out_after_m)} with what was "
-        f"found; noise {_m(case.floor_m)}; oracle {_m(case.oracle_m)}."
+        f"found; noise {_m(case.floor_m)}."
     )
     lines.append(
         f"Tool error over the workspace, against the truth: {_m(case.free_space_before_m)} before, "
-        f"{_m(case.free_space_after_m)} after; "
-        f"oracle {_m(case.oracle_free_space_m)}."
+        f"{_m(case.free_space_after_m)} after."
     )
     lines += [
         f"Size of {d.mechanism}: {s.name} {s.true:.3g}, reported {s.said:.3g} ± {s.sigma:.2g}."
@@ -338,10 +309,6 @@ def _lines(caption: str, lines: Sequence[TallyLine]) -> list[Html]:
         if line.located.n
     ]
     return [table(HEAD, rows, numeric=(1, 5), caption=caption)] if rows else []
-
-
-def _figures(head: Sequence[str], found: Sequence[ProofFigure]) -> Html:
-    return table(head, [(f.label, f.said, f.wanted)[: len(head)] for f in found])
 
 
 def _m(value: float | None) -> str:

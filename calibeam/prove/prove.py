@@ -9,7 +9,6 @@ from pathlib import Path
 import msgspec
 
 from calibeam.outcome import PartialResult, interruption
-from calibeam.prove.comparison import compared_cases
 from calibeam.prove.concealing import Concealed, conceal_cases, publish
 from calibeam.prove.diagnosing import Answered, diagnose_cases, reconciled
 from calibeam.prove.page import write_proof_page
@@ -35,7 +34,6 @@ class Plan:
     jobs: int
     without: tuple[str, ...] = ()  # physics that is taken out of the catalogue, to see what is reported then
     wired: int = 0  # further cases, whose recordings come over emulated wires
-    compare: int = 0  # cases for which the oracle and other methods are asked, too
 
 
 def prove(out: Path, plan: Plan, tell: Tell, command: str) -> ProofFile:
@@ -89,7 +87,6 @@ def _proved(layout: Layout, plan: Plan, tell: Tell, count: Tell, command: str) -
             reconciled(layout, one.scenario.name, layout.replayed(one.scenario.name))
     truths = [_opened(layout, c, plan.without) for c in concealed]
     scored = [score(layout, c, a, t) for c, a, t in zip(concealed, answered, truths, strict=True)]
-    scored = compared_cases(layout, scored, truths, plan.compare, plan.jobs, count)
     proof = ProofFile(
         SCHEMA,
         SOFTWARE,

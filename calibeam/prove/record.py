@@ -10,7 +10,6 @@ import msgspec
 
 SCHEMA = 1
 UNKNOWN = "unknown"
-DIAGNOSIS = "diagnosis"  # among the methods that are compared
 PLAIN = 0.6  # effect over noise from which a cause has to be found and named
 CONFIDENT = 0.9  # a name with less is a suspicion, and reported as one
 
@@ -70,15 +69,6 @@ class NamedCause(ProofRecord, frozen=True):
         return self.physics != UNKNOWN and self.confidence >= confidence and not self.right
 
 
-class BaselineScore(ProofRecord, frozen=True):
-    """Another method on the same unseen samples; 1: all that the oracle removes, 0: none."""
-
-    method: str
-    rms_m: float | None
-    gain: float | None
-    says: str  # what it answers to "where and why"
-
-
 class CaseScore(ProofRecord, frozen=True):
     """One case of the proof."""
 
@@ -105,10 +95,6 @@ class CaseScore(ProofRecord, frozen=True):
     free_space_after_m: float | None
     cpu_s: float
     error: str = ""
-    oracle_before_m: float | None = None  # geometry alone on the samples that the oracle is judged by
-    oracle_m: float | None = None  # with the true terms; None: not compared
-    oracle_free_space_m: float | None = None
-    baselines: tuple[BaselineScore, ...] = ()
     path: str = "in process"  # or "on wires": how the recording came about
     trouble: str = ""  # of the kind `raised`
     holds: bool | None = None  # what a trouble asks beside its cause; None: nothing

@@ -10,8 +10,8 @@ import pytest
 
 from acquisition.recording import read
 from benchmarks.hidden_columns import SEED, hidden_angles
-from calibeam.prove.baselines import features
-from calibeam.prove.comparison import GEOMETRY, compare, fold_of, oracle_terms
+from benchmarks.proof_baselines import features
+from benchmarks.proof_oracle import GEOMETRY, compare, fold_of, oracle_terms
 from calibeam.prove.record import Truth, truth_of
 from calibeam.prove.scoring import errors_m
 from calibeam.prove.unseen import tool_at, write_asked

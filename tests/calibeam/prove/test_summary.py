@@ -4,9 +4,9 @@ from collections.abc import Callable
 
 import msgspec
 
-from calibeam.prove.misses import faults, hidden_briefly
-from calibeam.prove.page import proof_html, summary
-from calibeam.prove.record import DIAGNOSIS, SCHEMA, BaselineScore, CaseScore, DefectScore, NamedCause, ProofFile
+from calibeam.prove.page import hidden_briefly, proof_html, summary
+from calibeam.prove.record import SCHEMA, CaseScore, DefectScore, NamedCause, ProofFile
+from calibeam.prove.tally import faults
 
 Case = Callable[..., CaseScore]
 Found = Callable[..., DefectScore]
@@ -18,21 +18,19 @@ def _plain(text: str) -> str:
 
 
 def test_every_kind_of_case_has_its_sentence(case: Case, found: Found) -> None:
-    score = BaselineScore(DIAGNOSIS, 1e-5, 0.98, "")
     strange = msgspec.structs.replace(found(physics="unknown", named=False), unknown_there=True)
     cases = [
-        case((found(),), baselines=(score,)),
+        case((found(),)),
         case((found(named=False),)),
         case(()),
         case((), (ALARM,)),
         case((strange,), kind="outside"),
     ]
-    single, nothing, outside, gain, wrong = map(_plain, summary(cases))
+    single, nothing, outside, wrong = map(_plain, summary(cases))
     assert "2 single causes" in single
     assert "located 100 % (34-100), named 50 %" in single
     assert nothing == "2 sessions with nothing wrong: something was reported in 50 % (9-91)."
     assert "1 mechanisms of no catalogue: located 100 %" in outside
-    assert "removes 0.98 (median)" in gain
     assert wrong.startswith("2 of 5 cases")
 
 

@@ -4,10 +4,9 @@ from collections.abc import Callable
 
 import pytest
 
-from calibeam.prove.misses import faults
 from calibeam.prove.page import ELSEWHERE, confusion
 from calibeam.prove.record import CaseScore, DefectScore, NamedCause, SizeScore
-from calibeam.prove.tally import Share, by_effect, by_enr, by_trouble, figures, plain, share
+from calibeam.prove.tally import Share, by_effect, by_enr, by_trouble, faults, figures, plain, share
 
 Case = Callable[..., CaseScore]
 Found = Callable[..., DefectScore]

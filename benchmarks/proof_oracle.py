@@ -1,40 +1,63 @@
 """The oracle and other methods on the unseen samples of a revealed case: who removes how much, and what do they report?
 
 The oracle refits geometry and exactly the true terms of the catalogue: what a perfect search would get. It gets places
-and physics from the opened seal; sizes, and which variant of a term fits best, it finds from the data. Some of the
-cases are compared, in worker processes, after the seals are open.
+and physics from the opened seal; sizes, and which variant of a term fits best, it finds from the data.
 """
 
-from collections.abc import Callable, Sequence
-from contextlib import closing
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.recording import read
-from calibeam.prove.baselines import Method, features, installed
-from calibeam.prove.record import DIAGNOSIS, BaselineScore, CaseScore, TrueDefect, Truth
+from benchmarks.proof_baselines import Method, features, installed
+from calibeam.prove.record import ProofRecord, TrueDefect, Truth
 from calibeam.prove.scoring import errors_m, same_place
-from calibeam.prove.seal import Layout
 from calibeam.prove.unseen import read_asked, tool_at
-from calibeam.worker_processes import in_workers
-from calibrate.diagnose.doubts.findings import named
-from calibrate.diagnose.doubts.folds import splits_of
-from calibrate.diagnose.record.file import read_diagnosis
-from calibrate.diagnose.record.schema import DiagnosisFile, FindingRecord
-from calibrate.diagnose.search.bench import Bench
-from calibrate.diagnose.search.line_search import refined
-from calibrate.diagnose.search.score import scores
-from calibrate.diagnose.state.fitted import Fitted, fit_geometry
-from calibrate.diagnose.state.linearised import Unseen
-from calibrate.diagnose.state.session import session_of
-from calibrate.errors import DataError
-from calibrate.fit.noise.scatter import sigma_about_zero
-from calibrate.model.effects.term import Accepted, Term
-from calibrate.model.sensors.encoder_difference import NAME as ENCODER_DIFFERENCE
+from calibrate.diagnose.doubts.findings import (
+    named,
+)
+from calibrate.diagnose.doubts.folds import (
+    splits_of,
+)
+from calibrate.diagnose.record.file import (
+    read_diagnosis,
+)
+from calibrate.diagnose.record.schema import (
+    DiagnosisFile,
+    FindingRecord,
+)
+from calibrate.diagnose.search.bench import (
+    Bench,
+)
+from calibrate.diagnose.search.line_search import (
+    refined,
+)
+from calibrate.diagnose.search.score import (
+    scores,
+)
+from calibrate.diagnose.state.fitted import (
+    Fitted,
+    fit_geometry,
+)
+from calibrate.diagnose.state.linearised import (
+    Accepted,
+    Unseen,
+)
+from calibrate.diagnose.state.session import (
+    session_of,
+)
+from calibrate.fit.noise.scatter import (
+    sigma_about_zero,
+)
+from calibrate.model.effects.term import (
+    Term,
+)
+from calibrate.model.sensors.encoder_difference import (
+    NAME as ENCODER_DIFFERENCE,
+)
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
@@ -134,15 +157,24 @@ def rms_m(misfit: Floats) -> float:
 
 
 SEED = 3  # of the split
+DIAGNOSIS = "diagnosis"  # among the methods
 GEOMETRY = "geometry only"
 WORTH = 0.9  # of the error: an oracle that leaves more has nothing to share out
 
 
-@dataclass(frozen=True)
-class Compared:
+class BaselineScore(ProofRecord, frozen=True):
+    """Another method on the same unseen samples; 1: all that the oracle removes, 0: none."""
+
+    method: str
+    rms_m: float | None
+    gain: float | None
+    says: str  # what it answers to "where and why"
+
+
+class Compared(ProofRecord, frozen=True):
     """Of one case, all on the same unseen samples."""
 
-    before_m: float
+    before_m: float  # geometry alone
     oracle_m: float
     free_space_m: float | None  # of the oracle; None where its terms do not hold at other poses
     baselines: tuple[BaselineScore, ...]
@@ -219,48 +251,3 @@ def _gain(rms: float, before_m: float, oracle_m: float) -> float | None:
     if oracle_m > WORTH * before_m:
         return None
     return (before_m**2 - rms**2) / (before_m**2 - oracle_m**2)
-
-
-ASKED = ("one", "disturbed", "three")
-VISIBLE = 0.6  # effect over noise: of less there is too little to share out
-
-
-def compared_cases(
-    layout: Layout,
-    cases: Sequence[CaseScore],
-    truths: Sequence[Truth],
-    most: int,
-    jobs: int,
-    tell: Callable[[str], None],
-) -> list[CaseScore]:
-    """All cases, the first `most` of those with plain effects with what others make of them."""
-    fit = [i for i, c in enumerate(cases) if _worth_it(c)][:most]
-    out = list(cases)
-    if not fit:
-        return out
-    orders = [(layout, cases[i].name, truths[i], cases[i].family) for i in fit]
-    with closing(in_workers(_compared, orders, jobs)) as coming:
-        for number, (i, found) in enumerate(zip(fit, coming, strict=True), start=1):
-            tell(f"compared {number} of {len(fit)}")
-            if found is not None:
-                out[i] = msgspec.structs.replace(
-                    out[i],
-                    oracle_before_m=found.before_m,
-                    oracle_m=found.oracle_m,
-                    oracle_free_space_m=found.free_space_m,
-                    baselines=found.baselines,
-                )
-    return out
-
-
-def _worth_it(case: CaseScore) -> bool:
-    return case.kind in ASKED and not case.error and max(d.enr for d in case.defects) >= VISIBLE
-
-
-def _compared(order: tuple[Layout, str, Truth, str]) -> Compared | None:
-    """None where a recording cannot be fitted at all: the diagnosis has reported it already."""
-    layout, name, truth, family = order
-    try:
-        return compare(layout.recording(name), layout.answer(name), layout.asked(name), truth, family)
-    except DataError:
-        return None
