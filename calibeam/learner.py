@@ -12,9 +12,7 @@ from numpy.typing import NDArray
 from acquisition.recording.rig import Rig
 from acquisition.session.records import Sample
 from calibrate.fit.solvers import solve
-from calibrate.model.assumed_rig.assumed_arm import BelievedArm
-from calibrate.model.assumed_rig.assumed_fixture import BelievedFixture
-from calibrate.model.assumed_rig.assumed_rig import BelievedRig
+from calibrate.model.assumed_rig import BelievedArm, BelievedFixture, BelievedRig
 from calibrate.model.dual_psd_rig import dual_psd_chain
 from calibrate.model.parameters import Parameter
 from calibrate.model.problem import Problem

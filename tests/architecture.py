@@ -141,6 +141,33 @@ def chain() -> list[str]:
     return max((below(name) for name in sorted(modules())), key=len)
 
 
+def faces() -> dict[str, int]:
+    """Packages of calibrate that export names, with how many."""
+    found: dict[str, int] = {}
+    for m in modules().values():
+        if m.is_face and m.name.startswith("calibrate."):
+            for node in m.tree.body:
+                if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "__all__":
+                    found[m.name] = len(ast.literal_eval(node.value))
+    return found
+
+
+def past_a_face() -> list[str]:
+    """Imports, of another floor of calibrate or of the program, from a module inside a package that has a face."""
+    doors = faces()
+
+    def floor(name: str) -> list[str]:
+        return name.split(".")[:2]
+
+    return [
+        f"{m.name} -> {node.module}"
+        for m in modules().values()
+        for node in ast.walk(m.tree)
+        if isinstance(node, ast.ImportFrom) and node.module and node.module.rpartition(".")[0] in doors
+        if floor(m.name) != floor(node.module)
+    ]
+
+
 @dataclass(frozen=True)
 class Figure:
     """What is counted, how, the most it may be today (it only ever falls), and the target of the design."""
@@ -168,6 +195,8 @@ def figures() -> tuple[Figure, ...]:
         Figure("small modules with one importer", lambda: len(with_one_importer()), TODAY["one_importer"], 0),
         Figure("class names used twice in a top-level package", lambda: len(repeated_classes()), TODAY["classes"], 0),
         Figure("file names used twice", lambda: len(repeated_files()), TODAY["file_names"], 0),
+        Figure("imports past the face of a package", lambda: len(past_a_face()), 0, 0),
+        Figure("most names of a face", lambda: max(faces().values()), 15, 15),
         Figure("longest chain of imports", lambda: len(chain()), TODAY["chain"], 15),
     )
 

@@ -16,16 +16,18 @@ from calibeam.console import Console
 from calibeam.motion.motion_inverse import MotionInverse
 from calibeam.outcome import PartialResult
 from calibeam.overwriting import writes
-from calibrate.apply.correct.corrected import (
+from calibrate.apply.correct import (
     Corrected,
     FrameError,
     Options,
     Wanted,
     correct,
+    corrected_rows,
+    measured_frame,
+    read_points,
+    read_poses,
 )
-from calibrate.apply.correct.frames import measured_frame
-from calibrate.apply.correct.tables import corrected_rows, read_points, read_poses
-from calibrate.apply.programs.rewriting import correct_program, dialect_of
+from calibrate.apply.programs import correct_program, dialect_of
 from calibrate.errors import DataError
 from calibrate.model.arms.rig_arm import RigArm
 from calibrate.model.model_file import ModelFile, read_model

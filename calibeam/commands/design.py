@@ -17,7 +17,7 @@ from calibeam.software import SOFTWARE
 from calibrate.report.elements.html import page_output
 
 if TYPE_CHECKING:  # loaded when it is needed: it takes a second
-    from calibrate.design.places import Places
+    from calibrate.design import Places
 
 Count = Annotated[int, Parameter(validator=validators.Number(gte=1))]
 Progress = Callable[[str, int, int], None]
@@ -79,9 +79,7 @@ def design_command(
     """
     from calibeam.motion.reachable_poses import candidates_of
     from calibeam.printing.design import print_design
-    from calibrate.design.design import Asked, design, record_of
-    from calibrate.design.information import information_of
-    from calibrate.design.seen import seen_by
+    from calibrate.design import Asked, design, information_of, record_of, seen_by
 
     loaded, rng, console = load_rig(rig), np.random.default_rng(seed), Console()
     with progress_bar(Console(stderr=True)) as bar:
@@ -114,8 +112,7 @@ def design_command(
 def _places(rig: Rig, poses: int, most: int, rng: np.random.Generator, progress: Progress) -> "tuple[Places, ...]":
     """Of the rig's own places and of a grid about them."""
     from calibeam.motion.reachable_poses import candidates_of, with_grid
-    from calibrate.design.information import information_of
-    from calibrate.design.places import choose_places
+    from calibrate.design import choose_places, information_of
     from calibrate.errors import DataError
 
     if rig.fixture is None or not rig.placements:

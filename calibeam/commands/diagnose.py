@@ -14,9 +14,9 @@ from calibeam.printing.results import print_diagnosis, print_streams
 from calibeam.results.diagnosis import diagnose_recording, diagnose_streams, plan_next, refuse_wrong_file
 from calibeam.results.identification import naming_source
 from calibrate.diagnose.record.file import DIAGNOSIS, write_diagnosis
-from calibrate.diagnose.with_model.from_diagnosis import model_of_diagnosis
+from calibrate.diagnose.with_model import model_of_diagnosis
 from calibrate.model.model_file import MODEL, read_model, write_model
-from calibrate.report.diagnosis.diagnosis_page import write_diagnosis_report
+from calibrate.report.diagnosis import write_diagnosis_report
 from calibrate.report.elements.html import page_output
 
 

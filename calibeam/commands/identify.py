@@ -19,12 +19,7 @@ from calibeam.results.identification import (
     report_unfinished,
     write_session_model,
 )
-from calibrate.apply.export.export import (
-    ExportForm,
-    FormName,
-    export_model,
-    form_named,
-)
+from calibrate.apply.export import ExportForm, FormName, export_model, form_named
 from calibrate.errors import DataError
 from calibrate.fit.identify.planned import rig_as_planned
 from calibrate.fit.solvers import Status
@@ -35,7 +30,7 @@ from calibrate.model.model_file import (
     write_model,
 )
 from calibrate.model.sensors.catalogue import unused_columns
-from calibrate.report.evidence.session_evidence import session_evidence
+from calibrate.report.evidence import session_evidence
 
 
 @writes(out=MODEL)
@@ -131,7 +126,7 @@ def _identify(
 
 
 def _refit(console: Console, recording: Path, known: ModelFile, out: Path, export: tuple[ExportForm, ...]) -> Status:
-    from calibrate.diagnose.with_model.later_recording import refit  # a third of a second of imports that few runs need
+    from calibrate.diagnose.with_model import refit  # a third of a second of imports that few runs need
 
     source = read(recording)
     found = refit(known, source)

@@ -31,16 +31,9 @@ from calibeam.outcome import taken_back
 from calibeam.overwriting import writes
 from calibeam.printing.pose_test import print_pose_test
 from calibeam.software import SOFTWARE
-from calibrate.apply.correct.corrected import Options, Wanted, correct
+from calibrate.apply.correct import Options, Wanted, correct
 from calibrate.errors import DataError
-from calibrate.iso9283.attained import EvaluatedTest, evaluate
-from calibrate.iso9283.cube import (
-    CYCLE,
-    CYCLES,
-    FROM_THREE_SIDES,
-    Plane,
-)
-from calibrate.iso9283.performance import PoseTest
+from calibrate.iso9283 import CYCLE, CYCLES, FROM_THREE_SIDES, EvaluatedTest, Plane, PoseTest, evaluate
 from calibrate.model.arms.rig_arm import RigArm
 from calibrate.model.model_file import ModelFile, read_model
 

@@ -16,7 +16,7 @@ from calibeam.results.identification import identify_and_judge, naming_source
 from calibeam.results.session_results import write_recording_report
 from calibrate.diagnose.record.file import read_diagnosis
 from calibrate.model.model_file import read_model
-from calibrate.report.drift.two_calibrations import Calibration
+from calibrate.report.drift import Calibration
 from calibrate.report.elements.html import page_output
 from calibrate.report.elements.verdict import Answers
 

@@ -13,11 +13,17 @@ from calibeam.overwriting import writes
 from calibeam.printing.progress import progress_bar
 from calibeam.printing.tables import print_error_simulation
 from calibeam.software import SOFTWARE
-from calibrate.error_simulation.error_plan import NOTHING_STATED, read_error_plan, sources_of
-from calibrate.error_simulation.machine import Machine, identified_machine, machine_of
+from calibrate.error_simulation import (
+    NOTHING_STATED,
+    Machine,
+    identified_machine,
+    machine_of,
+    read_error_plan,
+    sources_of,
+)
 
 if TYPE_CHECKING:
-    from calibrate.error_simulation.simulate import Simulation
+    from calibrate.error_simulation import Simulation
 
 Count = Annotated[int, Parameter(validator=validators.Number(gte=1))]
 
@@ -67,7 +73,7 @@ def simulate_errors_command(
         Print what stands in errors.json, on one line, and nothing else.
 
     """
-    from calibrate.error_simulation.simulate import Asked, record_of, simulate
+    from calibrate.error_simulation import Asked, record_of, simulate
 
     machine, loaded, identified = _machine(rig)
     plan = NOTHING_STATED if errors is None else read_error_plan(errors)
@@ -95,7 +101,7 @@ def simulate_errors_command(
 def write_simulation(folder: Path, simulation: "Simulation") -> tuple[Path, ...]:
     """errors.json, errors.html, and every figure as an SVG of its own. DataError, OSError where that cannot be."""
     from calibeam.motion.figures import write_figure  # matplotlib takes a second to load
-    from calibrate.error_simulation.simulate import write_record
+    from calibrate.error_simulation import write_record
     from calibrate.report.error_simulation_page import PICTURES, write_page_of
 
     folder.mkdir(parents=True, exist_ok=True)

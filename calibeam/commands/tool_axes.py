@@ -22,15 +22,16 @@ from calibrate.model.arms.catalogue import arm_of
 from calibrate.model.arms.eccentric import with_discs
 from calibrate.model.model_file import ModelFile, RigIdentity, read_model
 from calibrate.model.predict import Predictor
-from calibrate.tool_axes.arm_prior import (
+from calibrate.tool_axes import (
     DEFAULT,
     ArmErrors,
+    TargetRows,
+    ToolFile,
     assumed_prior,
+    calibrate_tool,
     prior_of_model,
+    tool_record,
 )
-from calibrate.tool_axes.tool import calibrate_tool
-from calibrate.tool_axes.tool_file import ToolFile, tool_record
-from calibrate.tool_axes.wrist_fit import TargetRows
 
 TARGET = "target"  # column: which target of the tool a row is of, a whole number; absent: there is one
 MOST_TARGETS = 1000

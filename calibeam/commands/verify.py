@@ -18,7 +18,7 @@ from calibeam.software import SOFTWARE
 from calibrate.quantities import DASH, length
 from calibrate.report.elements.html import page_output
 from calibrate.report.verification_page import SAYS, write_verification_page
-from calibrate.verify.verify import Verification, verification_file, verify
+from calibrate.verify import Verification, verification_file, verify
 
 
 @writes(out=json_output("calibeam-verification"), report=page_output("verification"))

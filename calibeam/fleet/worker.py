@@ -31,7 +31,7 @@ from calibrate.model.arms.eccentric import with_discs
 from calibrate.model.model_file import Fields, ModelFile
 from calibrate.model.parameters import values_by_name
 from calibrate.model.predict import Predictor
-from calibrate.report.drift.two_calibrations import drawn_values
+from calibrate.report.drift import drawn_values
 
 IMPORTED = "imported_from"  # note of a recording that was made of a session folder: its start is that of the import
 OF_NOISE = ("_believed", "_sigma", "_believed_rad", "_believed_m", "_sigma_rad", "_sigma_m")

@@ -18,8 +18,7 @@ from acquisition.wires.psd_view import NO_LIGHT, SATURATED, PsdView
 from calibeam.live.feed import Progress
 from calibeam.live.health import Health
 from calibrate.model.arms.rig_arm import RigArm
-from calibrate.model.assumed_rig.assumed_fixture import Light
-from calibrate.model.assumed_rig.assumed_rig import BelievedRig
+from calibrate.model.assumed_rig import BelievedRig, Light
 from calibrate.model.dual_psd_rig import dual_psd_chain
 from drivers.device import Block
 

@@ -17,7 +17,7 @@ from acquisition.recording.rig import Rig
 from calibeam.motion.motion_inverse import MotionInverse
 from calibeam.motion.reachable_poses import clear_for_device
 from calibrate.errors import DataError
-from calibrate.iso9283.cube import Plane, cube_corners_m, cube_poses_m
+from calibrate.iso9283 import Plane, cube_corners_m, cube_poses_m
 from calibrate.model.arms.rig_arm import RigArm
 from calibrate.model.rigid import inverse
 

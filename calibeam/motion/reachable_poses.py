@@ -20,11 +20,10 @@ from acquisition.motion.inverse.solve import all_solutions
 from acquisition.recording.rig import Placement, Pose, Rig
 from acquisition.session.plan import PlanOptions
 from calibeam.motion.gate_of_rig import cell_of, solver_of
-from calibrate.design.candidates import Candidates
+from calibrate.design import Candidates
 from calibrate.errors import DataError
 from calibrate.model.arms.convert import pose_of
-from calibrate.model.assumed_rig.assumed_fixture import Light
-from calibrate.model.assumed_rig.assumed_rig import BelievedRig
+from calibrate.model.assumed_rig import BelievedRig, Light
 from calibrate.model.rigid import transform
 
 HEIGHTS_M = (-0.05, 0.0, 0.15)  # beside that of the rig's first place

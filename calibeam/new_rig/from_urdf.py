@@ -22,7 +22,7 @@ from scipy.spatial.transform import Rotation
 from acquisition.recording.files import read_text, shown
 from acquisition.recording.files.bounds import FEW
 from calibeam.new_rig.drawn import ANY_TURN_RAD, DrawnArm, DrawnJoint, onto_axis, poe_text
-from calibrate.apply.export.ur import BODIES
+from calibrate.apply.export import BODIES
 from calibrate.errors import DataError
 from calibrate.model.rigid import inverse
 

@@ -16,7 +16,7 @@ from calibeam.notebook.tables import SCREEN, pandas_if_installed
 
 if TYPE_CHECKING:
     from calibeam.results.identification import JudgedModel
-    from calibrate.apply.correct.corrected import Corrected, Wanted
+    from calibrate.apply.correct import Corrected, Wanted
     from calibrate.apply.predicting import Placed
     from calibrate.model.model_file import ModelFile, ModelParameter
 
@@ -131,7 +131,7 @@ class Model:
         """
         from acquisition.recording.rig import parse_rig
         from calibeam.motion.motion_inverse import MotionInverse
-        from calibrate.apply.correct.corrected import Options, correct
+        from calibrate.apply.correct import Options, correct
         from calibrate.model.arms.rig_arm import RigArm
 
         rig = parse_rig(self.file.rig.text or "", "rig.toml in the model")
@@ -169,7 +169,7 @@ class Model:
         cannot hold and for a form that there is not, OSError where it cannot be written.
         """
         from acquisition.recording.rig import parse_rig
-        from calibrate.apply.export.export import export_model, form_named
+        from calibrate.apply.export import export_model, form_named
 
         rig = parse_rig(self.file.rig.text or "", "rig.toml in the model")
         return export_model(Path(path), rig, self.file, form_named(form))
@@ -212,8 +212,7 @@ def _wanted(
     poses: "Floats | Path | str", conditions: "Mapping[str, Floats | float]", near_rad: Floats | None, joints: int
 ) -> "Wanted":
     """DataError for poses that are no rigid motions."""
-    from calibrate.apply.correct.corrected import Wanted
-    from calibrate.apply.correct.tables import read_poses
+    from calibrate.apply.correct import Wanted, read_poses
     from calibrate.errors import DataError
 
     if isinstance(poses, Path | str):

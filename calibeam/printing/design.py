@@ -8,13 +8,10 @@ from acquisition.recording.rig import Rig
 from calibeam.console import Console
 from calibeam.printing.tables import plain_table
 from calibeam.rig_files import of_one_point
-from calibrate.design.design import Design
-from calibrate.design.places import Places
-from calibrate.design.seen import Seen
-from calibrate.diagnose.doubts.diagnosis import Named
-from calibrate.diagnose.doubts.smallest_visible import Smallest
+from calibrate.design import Design, Places, Seen
+from calibrate.diagnose.doubts import Named, Smallest
 from calibrate.quantities import counted, length
-from calibrate.report.diagnosis.words import size_of
+from calibrate.report.diagnosis import size_of
 from calibrate.report.pose_design_page import of_the_curve
 
 MATTERS_M = 1e-7  # of what no pose shows: below, the target does not feel it

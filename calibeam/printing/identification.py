@@ -9,7 +9,7 @@ import numpy as np
 from rich.table import Table
 
 from calibeam.console import Console
-from calibrate.apply.export.nominal_table import cells, nominal_table
+from calibrate.apply.export import cells, nominal_table
 from calibrate.fit.fit_plan import ZEROS_ONLY_COMMAND
 from calibrate.fit.identify.estimates import ONLY_BELIEVED, JointZero
 from calibrate.fit.identify.evidence_record import parameter_records
@@ -20,7 +20,7 @@ from calibrate.fit.identify.result import (
     Identification,
     Unseen,
 )
-from calibrate.fit.rank.observability import Observability
+from calibrate.fit.rank import Observability
 from calibrate.model.default_tolerance import said_of
 from calibrate.model.effect_records import Effect
 from calibrate.model.effects.term import Size, decimals_of, plain
@@ -40,10 +40,8 @@ from calibrate.report.elements.verdict import (
     Trust,
     Verdict,
 )
-from calibrate.report.evidence.model_tests import fit_end
-from calibrate.report.evidence.session_evidence import SessionEvidence
-from calibrate.report.evidence.session_verdict import session_verdict
-from calibrate.report.workspace.workspace_errors import session_room, tool_numbers
+from calibrate.report.evidence import SessionEvidence, fit_end, session_verdict
+from calibrate.report.workspace import session_room, tool_numbers
 
 COLOUR = {Trust.GOOD: "green", Trust.CARE: "yellow", Trust.NONE: "red"}
 

@@ -6,14 +6,7 @@ from collections.abc import Callable, Sequence
 from rich.table import Table
 
 from calibeam.console import Console
-from calibrate.iso9283.attained import EvaluatedTest
-from calibrate.iso9283.cube import CYCLES
-from calibrate.iso9283.performance import (
-    DistancePerformance,
-    Performance,
-    PosePerformance,
-    PoseTest,
-)
+from calibrate.iso9283 import CYCLES, DistancePerformance, EvaluatedTest, Performance, PosePerformance, PoseTest
 from calibrate.model.effects.term import with_sigma
 
 MM, MRAD = 1e3, 1e3

@@ -8,7 +8,7 @@ from calibeam.console import Console
 from calibrate.diagnose.record.schema import ClockRecord, DiagnosisFile, FindingRecord
 from calibrate.model.effects.term import with_sigma
 from calibrate.quantities import counted
-from calibrate.report.diagnosis.words import (
+from calibrate.report.diagnosis import (
     SPLITS,
     before_after,
     free_space_words,

@@ -6,7 +6,7 @@ import numpy as np
 from rich.table import Table
 
 from calibeam.console import Console
-from calibrate.error_simulation.simulate import SHARE, Simulation
+from calibrate.error_simulation import SHARE, Simulation
 from calibrate.quantities import (
     DASH,
     angle,
@@ -15,12 +15,7 @@ from calibrate.quantities import (
     length,
     significant,
 )
-from calibrate.tool_axes.tool_file import (
-    ArmErrorsRecord,
-    AxisRecord,
-    TargetRecord,
-    ToolFile,
-)
+from calibrate.tool_axes import ArmErrorsRecord, AxisRecord, TargetRecord, ToolFile
 
 COLOUR = {"yes": "green", "with care": "yellow", "no": "red"}
 WHERE = "in the flange"

@@ -29,7 +29,7 @@ from calibeam.prove.unseen import write_asked
 from calibeam.rig_files import RIGS
 from calibeam.software import SOFTWARE
 from calibeam.worker_processes import in_workers
-from calibrate.diagnose.streams.sample_times import sample_windows
+from calibrate.diagnose.streams import sample_windows
 from drivers.clock import SystemClock
 from drivers.errors import DeviceError
 from simulators.conceal.case import Case, conceal

@@ -34,7 +34,7 @@ from calibeam.prove.seal import Layout
 from calibeam.prove.unseen import LaserBeam, Tool, read_unseen
 from calibrate.diagnose.record.file import read_diagnosis
 from calibrate.diagnose.record.schema import DiagnosisFile, FindingRecord, NameRecord
-from calibrate.fit.noise.scatter import sigma_about_zero
+from calibrate.fit.noise import sigma_about_zero
 from calibrate.model.alignment import aligned_difference
 
 

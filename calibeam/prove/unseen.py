@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from calibrate.diagnose.state.fitted import Fitted
+from calibrate.diagnose.state import Fitted
 from calibrate.model.effects.drivers import Drivers
 from calibrate.model.effects.ports import Perturbation
 from calibrate.model.effects.term import Accepted

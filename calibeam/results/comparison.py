@@ -63,12 +63,11 @@ from calibrate.compare.streams import (
     stream_differences,
     stream_pairs,
 )
-from calibrate.diagnose.doubts.diagnosis import Named, Verdict
+from calibrate.diagnose.doubts import Named, Verdict
 from calibrate.diagnose.record.schema import DiagnosisFile, SizeRecord
 from calibrate.diagnose.record.to_file import file_of
-from calibrate.diagnose.state.fitted import Fitted
-from calibrate.diagnose.streams.from_recording import streams_of
-from calibrate.diagnose.streams.recorded import devices_of
+from calibrate.diagnose.state import Fitted
+from calibrate.diagnose.streams import devices_of, streams_of
 from calibrate.errors import DataError
 from calibrate.fit.identify.identify import wrong_file
 from calibrate.model.effects.term import Size, plain

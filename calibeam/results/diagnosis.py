@@ -11,10 +11,9 @@ from acquisition.recording import Recording
 from acquisition.recording.pose_plan import write_pose_plan
 from acquisition.recording.rig import rig_sha256
 from calibeam.software import SOFTWARE
-from calibrate.diagnose.doubts.diagnosis import Verdict
+from calibrate.diagnose.doubts import Verdict
 from calibrate.diagnose.from_recording import Diagnosed, diagnose_samples
-from calibrate.diagnose.new_poses.contests import separating
-from calibrate.diagnose.new_poses.plan_of import plan_of
+from calibrate.diagnose.new_poses import plan_of, separating
 from calibrate.diagnose.record.file import write_diagnosis
 from calibrate.diagnose.record.schema import (
     SCHEMA,
@@ -24,10 +23,8 @@ from calibrate.diagnose.record.schema import (
 )
 from calibrate.diagnose.record.to_file import file_of
 from calibrate.diagnose.stages import Stage, Stages
-from calibrate.diagnose.streams.from_recording import streams_of
-from calibrate.diagnose.streams.to_file import with_streams
-from calibrate.diagnose.with_model.known import known_before
-from calibrate.diagnose.with_model.later_recording import beside_known, only_new
+from calibrate.diagnose.streams import streams_of, with_streams
+from calibrate.diagnose.with_model import beside_known, known_before, only_new
 from calibrate.errors import DataError
 from calibrate.model.model_file import ModelFile
 from calibrate.model.sensors.catalogue import unused_columns

@@ -16,7 +16,7 @@ from acquisition.recording import Recording, readings_sha256
 from acquisition.recording.rig import ArmModel, Rig, rig_sha256
 from acquisition.recording.samples import measured_sha256
 from calibeam.outcome import PartialResult
-from calibrate.apply.export.dh_csv import dh_table_of
+from calibrate.apply.export import dh_table_of
 from calibrate.apply.predicting import as_fitted
 from calibrate.errors import DataError
 from calibrate.fit.fit_plan import (
@@ -34,8 +34,7 @@ from calibrate.fit.solvers import Status
 from calibrate.model.converted_rig import rig_in_model
 from calibrate.model.model_file import ModelFile, RigIdentity, write_model
 from calibrate.report.elements.verdict import Verdict
-from calibrate.report.evidence.session_evidence import session_evidence
-from calibrate.report.evidence.session_verdict import session_verdict
+from calibrate.report.evidence import session_evidence, session_verdict
 
 UNFINISHED = (Status.OUT_OF_STEPS, Status.STALLED, Status.AT_BOUND)
 

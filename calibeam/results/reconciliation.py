@@ -26,15 +26,15 @@ from calibrate.compare.beside_simulation import device_between
 from calibrate.compare.corrected import corrected_samples, simulated_of
 from calibrate.compare.matched import match
 from calibrate.compare.seated import is_seated
-from calibrate.diagnose.doubts.diagnosis import Verdict
+from calibrate.diagnose.doubts import Verdict
 from calibrate.diagnose.from_recording import FEWEST, Diagnosed
 from calibrate.diagnose.record.schema import DiagnosisFile
-from calibrate.diagnose.state.session import session_of
-from calibrate.diagnose.with_model.from_diagnosis import model_of_diagnosis, model_of_fit
+from calibrate.diagnose.state import session_of
+from calibrate.diagnose.with_model import model_of_diagnosis, model_of_fit
 from calibrate.errors import DataError
 from calibrate.fit.fit_plan import FitPlan
 from calibrate.model.model_file import ModelFile
-from calibrate.model.placement.target import TARGETS
+from calibrate.model.placement import TARGETS
 from calibrate.model.sensors import (
     full_pose,
     position,

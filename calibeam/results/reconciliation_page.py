@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from calibeam.results.reconciliation import AGREES, BEYOND, Reconciled, ReconcileFile, RowRecord, UnseenRecord
 from calibeam.software import SOFTWARE
 from calibrate.quantities import length, significant
-from calibrate.report.diagnosis.finding_page import chain_figure, chain_of
+from calibrate.report.diagnosis import chain_figure, chain_of
 from calibrate.report.elements.html import (
     Html,
     bullets,

@@ -15,16 +15,16 @@ from calibeam.printing.identification import print_identification
 from calibeam.printing.results import print_diagnosis
 from calibeam.results.identification import identify_session, session_model, write_session_model
 from calibrate.diagnose.record.schema import DiagnosisFile
-from calibrate.diagnose.with_model.from_diagnosis import model_of_diagnosis
+from calibrate.diagnose.with_model import model_of_diagnosis
 from calibrate.errors import DataError
 from calibrate.fit.identify.result import Identification
 from calibrate.model.model_file import ModelFile, write_model
-from calibrate.report.drift.two_calibrations import Calibration, drift_of
+from calibrate.report.drift import Calibration, drift_of
 from calibrate.report.elements.html import write_page
 from calibrate.report.elements.verdict import TOOL, Answers
-from calibrate.report.evidence.session_evidence import session_evidence
+from calibrate.report.evidence import session_evidence
 from calibrate.report.session_report import session_answers, session_page
-from calibrate.report.workspace.workspace_errors import session_arm, session_room
+from calibrate.report.workspace import session_arm, session_room
 
 NOW = "now"
 

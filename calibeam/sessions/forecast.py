@@ -25,16 +25,15 @@ from acquisition.recording.rig import Rig
 from acquisition.recording.samples import SPOTS, per_joint
 from acquisition.session.plan import Block, PoseKey
 from acquisition.session.records import Sample
-from calibrate.design.candidates import Candidates
-from calibrate.design.information import Information, target_of, with_prior
-from calibrate.fit.accuracy.free_space import FELT_M
+from calibrate.design import Candidates, Information, target_of, with_prior
+from calibrate.fit.accuracy import FELT_M
 from calibrate.fit.identify.rounds import Fitted, coarse_start, settled_fit
 from calibrate.fit.identify.session import instruments_for_fit
-from calibrate.fit.noise.variance import VarianceFactors
-from calibrate.fit.rank.identifiability import Identifiability, analyse
+from calibrate.fit.noise import VarianceFactors
+from calibrate.fit.rank import Identifiability, analyse
 from calibrate.fit.solvers import Status
 from calibrate.model.arms.catalogue import arm_of
-from calibrate.model.assumed_rig.assumed_rig import BelievedRig
+from calibrate.model.assumed_rig import BelievedRig
 from calibrate.model.parameters import index_of, priors, start_values
 from calibrate.model.read_samples import SIGMA_COLUMNS
 

@@ -38,7 +38,7 @@ from calibeam.sessions.reporter import StatusReporter
 from calibeam.sessions.status import Listener, clock_words
 from calibeam.sessions.views import PageView, PlainView, TerminalView
 from calibeam.site_log import SESSION_LOG, SITE_LOG
-from calibrate.design.candidates import POSE_S
+from calibrate.design import POSE_S
 from drivers.clock import Clock, SystemClock
 
 FINISH, MORE, PLACE = "f", "m", "n"

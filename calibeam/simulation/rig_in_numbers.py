@@ -16,7 +16,7 @@ from acquisition.recording.rig import ArmModel, Rig
 from acquisition.recording.samples import BAR, SEAT, TARGET
 from calibrate.errors import DataError
 from calibrate.model.arms.catalogue import arm_of
-from calibrate.model.placement.device import AXES, Device
+from calibrate.model.placement import AXES, Device
 from calibrate.model.predict import Predictor
 from calibrate.model.rigid import transform
 from calibrate.model.sensors.bar import bar_pairs

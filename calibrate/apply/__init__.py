@@ -1,0 +1,1 @@
+"""What one does with a model: predict readings, correct poses and programs, export."""

@@ -1,0 +1,1 @@
+"""Two recordings, or a recording and a simulation: matching of poses, what differs between them, and streams."""

@@ -38,14 +38,11 @@ from calibrate.compare.corrected import (
     predictor_of,
     without_known,
 )
-from calibrate.diagnose.doubts.diagnosis import Named
+from calibrate.diagnose.doubts import Named
 from calibrate.diagnose.from_recording import Diagnosed, diagnose_samples
-from calibrate.diagnose.search.bench import Bench
-from calibrate.diagnose.search.stated_sizes import sandwich
-from calibrate.diagnose.state.assumed import Assumed
-from calibrate.diagnose.state.fitted import Fitted, fit_geometry
-from calibrate.diagnose.state.session import Session
-from calibrate.diagnose.with_model.known import ANEW, Known
+from calibrate.diagnose.search import Bench, sandwich
+from calibrate.diagnose.state import Assumed, Fitted, Session, fit_geometry
+from calibrate.diagnose.with_model import ANEW, Known
 from calibrate.errors import DataError
 from calibrate.fit.identify.session import about_of
 from calibrate.model.effects.moved import SIX

@@ -12,12 +12,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from calibrate.diagnose.doubts.diagnosis import Named
-from calibrate.diagnose.state.fitted import Fitted
-from calibrate.diagnose.state.visible import blind
+from calibrate.diagnose.doubts import Named
+from calibrate.diagnose.state import Fitted, blind
 from calibrate.model.effects.since_model import RECORDING
 from calibrate.model.effects.term import Shape
-from calibrate.model.optics.dual_psd import GAINS
+from calibrate.model.optics import GAINS
 from calibrate.model.parameters import Parameter, plausible_sizes
 from calibrate.model.placement import target
 from calibrate.model.sensors import seat

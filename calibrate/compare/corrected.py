@@ -19,10 +19,7 @@ from acquisition.recording.rig import Rig
 from acquisition.recording.samples import ORIENTATION, POSITION, SPOTS, per_joint
 from calibrate.compare.chain import Pair, columns_of
 from calibrate.compare.seated import is_seated
-from calibrate.diagnose.state.augmented import Augmented
-from calibrate.diagnose.state.fitted import Fitted
-from calibrate.diagnose.state.noise_of_fit import noise_of
-from calibrate.diagnose.state.session import Session, session_of
+from calibrate.diagnose.state import Augmented, Fitted, Session, noise_of, session_of
 from calibrate.errors import DataError
 from calibrate.fit.identify.session import about_of, believed_sigma
 from calibrate.fit.solvers import NEAR_START, solve

@@ -15,11 +15,9 @@ from numpy.typing import NDArray
 from calibrate.compare.beside_simulation import Beside, Constant
 from calibrate.compare.constants import LINK, ZERO
 from calibrate.compare.corrected import Simulated
-from calibrate.diagnose.doubts.diagnosis import Finding, Named
-from calibrate.diagnose.doubts.findings import named
-from calibrate.diagnose.search.bench import Bench
-from calibrate.diagnose.search.stated_sizes import sizes_of
-from calibrate.diagnose.state.fitted import Fitted
+from calibrate.diagnose.doubts import Finding, Named, named
+from calibrate.diagnose.search import Bench, sizes_of
+from calibrate.diagnose.state import Fitted
 from calibrate.model.effects.since_model import RECORDING
 from calibrate.model.effects.term import Accepted, Size, with_sigma
 

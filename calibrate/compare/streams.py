@@ -10,12 +10,19 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from calibrate.diagnose.doubts.diagnosis import Named
-from calibrate.diagnose.streams.clock import ClockFit, ClockStatus, clock_between
-from calibrate.diagnose.streams.examine import StreamReport
-from calibrate.diagnose.streams.finding import Outcome, StreamFinding
-from calibrate.diagnose.streams.recorded import Device
-from calibrate.diagnose.streams.track import Curve, Track, white_noise
+from calibrate.diagnose.doubts import Named
+from calibrate.diagnose.streams import (
+    ClockFit,
+    ClockStatus,
+    Curve,
+    Device,
+    Outcome,
+    StreamFinding,
+    StreamReport,
+    Track,
+    clock_between,
+    white_noise,
+)
 from calibrate.model.effects.term import Size
 
 Floats = NDArray[np.float64]

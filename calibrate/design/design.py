@@ -34,8 +34,8 @@ from calibrate.design.exchange import (
 from calibrate.design.information import Information
 from calibrate.design.places import Places
 from calibrate.design.seen import Seen
-from calibrate.diagnose.doubts.diagnosis import Named
-from calibrate.diagnose.new_poses.plan_of import short_way
+from calibrate.diagnose.doubts import Named
+from calibrate.diagnose.new_poses import short_way
 from calibrate.errors import DataError
 
 Floats = NDArray[np.float64]

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from acquisition.recording.rig import Rig
 from calibrate.design.candidates import Candidates
 from calibrate.fit.identify.session import instruments_for_fit
-from calibrate.fit.rank.identifiability import STRUCTURAL
+from calibrate.fit.rank import STRUCTURAL
 from calibrate.model.arms.catalogue import arm_of
 from calibrate.model.arms.rig_arm import limits_of
 from calibrate.model.dual_psd_rig import laser_of

@@ -14,13 +14,9 @@ from numpy.typing import NDArray
 
 from acquisition.recording.rig import Rig
 from calibrate.design.candidates import Candidates, Taken
-from calibrate.diagnose.doubts.diagnosis import Named
-from calibrate.diagnose.doubts.findings import named
-from calibrate.diagnose.doubts.isolability import Isolability, isolability
-from calibrate.diagnose.doubts.smallest_visible import Smallest, smallest_visible
-from calibrate.diagnose.search.bench import Bench
-from calibrate.diagnose.state.fitted import fit_geometry
-from calibrate.diagnose.state.session import session_of
+from calibrate.diagnose.doubts import Isolability, Named, Smallest, isolability, named, smallest_visible
+from calibrate.diagnose.search import Bench
+from calibrate.diagnose.state import fit_geometry, session_of
 from calibrate.model.dual_psd_rig import believed_noise
 from calibrate.model.sensors.position import POSITION_BELIEVED_M
 

@@ -20,7 +20,7 @@ from calibrate.diagnose.outlying_rows import (
     lasting,
 )
 from calibrate.diagnose.state.session import Session, session_of
-from calibrate.fit.gross_errors.bad_rows import bad_rows
+from calibrate.fit.gross_errors import bad_rows
 from calibrate.fit.identify.clean import refuse_most, rows_of
 from calibrate.fit.identify.identify import impossible_rows, wrong_file
 from calibrate.fit.identify.rounds import distances, wary_fit

@@ -1,0 +1,1 @@
+"""How much a row counts, and what is determined: problem, weighting, noise, rank, solvers, held-out rows, identify."""

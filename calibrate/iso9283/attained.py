@@ -17,10 +17,10 @@ from acquisition.recording import Samples
 from acquisition.recording.pose_plan import PosePlan
 from acquisition.recording.rig import Rig
 from acquisition.recording.samples import ORIENTATION, POSITION
-from calibrate.apply.correct.corrected import Arms, Options
+from calibrate.apply.correct import Arms, Options
 from calibrate.apply.predicting import Placed, placed
 from calibrate.errors import DataError
-from calibrate.fit.held_out.splits import CLOSE_RAD, same_poses
+from calibrate.fit.held_out import CLOSE_RAD, same_poses
 from calibrate.iso9283.performance import AttainedPoses, PoseTest, performance_of
 from calibrate.model.alignment import rigid_motion
 from calibrate.model.arms.rig_arm import RigArm

@@ -11,9 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from calibrate.error_simulation.monte_carlo import BINS
-from calibrate.error_simulation.sensitivity import ROUNDING_M, Single
-from calibrate.error_simulation.simulate import SHARE, Simulation
+from calibrate.error_simulation import BINS, ROUNDING_M, SHARE, Simulation, Single
 from calibrate.quantities import angle, length, significant
 from calibrate.report.elements.html import (
     Html,

@@ -7,10 +7,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from acquisition.recording.rig import Rig
-from calibrate.design.design import Design
-from calibrate.design.places import Places
-from calibrate.design.seen import Seen
-from calibrate.diagnose.doubts.diagnosis import Named
+from calibrate.design import Design, Places, Seen
+from calibrate.diagnose.doubts import Named
 from calibrate.quantities import length
 from calibrate.report.diagnosis.words import size_of
 from calibrate.report.elements.html import (

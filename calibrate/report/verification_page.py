@@ -28,8 +28,7 @@ from calibrate.report.elements.html import (
 from calibrate.report.elements.svg import drawn
 from calibrate.report.elements.tones import PLACES, Tone
 from calibrate.report.elements.verdict import Trust
-from calibrate.verify.measured_lengths import Figure, Judgement
-from calibrate.verify.verify import Verification
+from calibrate.verify import Figure, Judgement, Verification
 
 CONTENTS = {
     "figures": "Figures of the standards",

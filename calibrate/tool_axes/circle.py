@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibrate.errors import DataError
-from calibrate.fit.rank.identifiability import analyse
+from calibrate.fit.rank import analyse
 from calibrate.fit.solvers import Status, solve
 from calibrate.model.parameters import Parameter
 from calibrate.model.rigid import cross

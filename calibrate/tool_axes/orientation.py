@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from calibrate.model.chain import Chain
-from calibrate.model.placement.device import Device
-from calibrate.model.placement.target import Target
+from calibrate.model.placement import Device, Target
 from calibrate.model.rigid import cross, inverse
 from calibrate.model.sensors.position import Position
 from calibrate.tool_axes.wrist_fit import TargetRows, WristFit, target_names

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibrate.errors import DataError
-from calibrate.fit.rank.identifiability import analyse
+from calibrate.fit.rank import analyse
 from calibrate.fit.solvers import Status
 from calibrate.model.kinematic_model import KinematicModel
 from calibrate.model.parameters import hold

@@ -29,8 +29,7 @@ from calibrate.fit.solvers import (
 from calibrate.model.chain import Chain
 from calibrate.model.kinematic_model import KinematicModel
 from calibrate.model.parameters import Parameter, index_of, start_values
-from calibrate.model.placement.device import Device
-from calibrate.model.placement.target import UNKNOWN_PLAUSIBLE_M, Target
+from calibrate.model.placement import UNKNOWN_PLAUSIBLE_M, Device, Target
 from calibrate.model.problem import Problem
 from calibrate.model.rigid import inverse
 from calibrate.model.sensors.full_pose import FullPose

@@ -27,9 +27,12 @@ LATER = (
 )
 MOST_MODULES = 850  # 692 with CPython 3.11, of which 144 are numpy and 175 scipy; scipy.stats alone would add 300
 PROGRAM = """
-import pkgutil, sys, importlib, calibrate
+import sys, importlib, calibrate
+from pathlib import Path
 COMPILED = ("calibrate.model.arms.fast",)
-names = [module.name for module in pkgutil.walk_packages(calibrate.__path__, "calibrate.")]
+root = Path(calibrate.__path__[0])
+files = sorted(path.relative_to(root.parent).with_suffix("") for path in root.rglob("*.py"))
+names = [".".join(file.parts).removesuffix(".__init__") for file in files if file.stem != "__main__"]
 for later in (tuple(sys.argv[1:]), ("calibrate.report",)):
     for name in names:
         if not name.startswith((*later, *COMPILED)):

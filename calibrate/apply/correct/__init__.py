@@ -1,7 +1,23 @@
 """Commands that bring the real tool to wanted poses, with a model's geometry and physics; in tables and in programs.
 
 `corrected.correct` solves, `corrected.predicted_errors` judges any commands, `tables` reads poses.csv and makes the
-rows of corrected.csv, `programs.rewriting.correct_program` changes the literals of a program. Inverse kinematics come
-in as an argument: motion has the one that there is. Nothing is imported here: who lists the packages of calibrate does
-not want to load the physics.
+rows of corrected.csv; calibrate/apply/programs/ changes the literals of a program. Inverse kinematics come
+in as an argument: motion has the one that there is.
 """
+
+from calibrate.apply.correct.corrected import Arms, Corrected, FrameError, Options, Wanted, correct
+from calibrate.apply.correct.frames import measured_frame
+from calibrate.apply.correct.tables import corrected_rows, read_points, read_poses
+
+__all__ = [
+    "Arms",
+    "Corrected",
+    "FrameError",
+    "Options",
+    "Wanted",
+    "correct",
+    "corrected_rows",
+    "measured_frame",
+    "read_points",
+    "read_poses",
+]

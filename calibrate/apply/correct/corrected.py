@@ -21,7 +21,7 @@ from calibrate.apply.predicting import flange_with_physics, placed
 from calibrate.errors import DataError
 from calibrate.model.arms.rig_arm import RigArm
 from calibrate.model.model_file import ModelFile
-from calibrate.model.placement.target import point_by_twist
+from calibrate.model.placement import point_by_twist
 from calibrate.model.predict import Predictor
 from calibrate.model.rigid import inverse
 from calibrate.model.with_effects.applied import BY_JOINT

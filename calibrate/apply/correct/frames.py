@@ -15,7 +15,7 @@ from calibrate.apply.predicting import placed
 from calibrate.errors import DataError
 from calibrate.model.alignment import align
 from calibrate.model.model_file import ModelFile
-from calibrate.model.placement.target import point_by_twist
+from calibrate.model.placement import point_by_twist
 
 Floats = NDArray[np.float64]
 

@@ -16,7 +16,7 @@ from scipy.stats import norm, qmc
 
 from calibrate.apply.predicting import SEED, mean_motion
 from calibrate.model.arms.rig_arm import RigArm
-from calibrate.model.placement.target import point_by_twist
+from calibrate.model.placement import point_by_twist
 from calibrate.model.predict import Predictor
 from calibrate.model.rigid import inverse, transform
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from acquisition.recording.rig import ArmModel, Pose, Rig
 from calibrate.apply.export.identified import NO_NUMBER, IdentifiedArm, identified_arm
 from calibrate.fit.identify.estimates import ONLY_BELIEVED
-from calibrate.fit.rank.identifiability import STRUCTURAL, Identifiability, combinations_of
+from calibrate.fit.rank import STRUCTURAL, Identifiability, combinations_of
 from calibrate.model.arms.catalogue import arm_of
 from calibrate.model.arms.convert import Conversion, convert, pose_of
 from calibrate.model.arms.link_tolerance import LINK_PLAUSIBLE, ZERO_PLAUSIBLE_RAD

@@ -17,8 +17,7 @@ from scipy.spatial.transform import Rotation
 from acquisition.recording.rig import ArmModel, Joint, Make, Pose
 from calibrate.apply.export.dh_csv import dh_arm
 from calibrate.apply.export.identified import NO_NUMBER, IdentifiedArm
-from calibrate.fit.rank.identifiability import plainly
-from calibrate.fit.rank.not_determined import in_plain_words
+from calibrate.fit.rank import in_plain_words, plainly
 from calibrate.model.arms.coupled_readings import by_reading
 from calibrate.quantities import decimals_of, fixed
 

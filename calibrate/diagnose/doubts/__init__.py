@@ -1,0 +1,21 @@
+"""How sure a diagnosis is: findings with their alternatives, what has no name, unseen rows, stated noise, detection
+limits, and what these poses cannot tell apart.
+"""
+
+from calibrate.diagnose.doubts.diagnosis import Finding, Named, Verdict
+from calibrate.diagnose.doubts.findings import named
+from calibrate.diagnose.doubts.isolability import Isolability, isolability
+from calibrate.diagnose.doubts.smallest_visible import Smallest, smallest_visible
+from calibrate.diagnose.doubts.stated_noise import Statement
+
+__all__ = [
+    "Finding",
+    "Isolability",
+    "Named",
+    "Smallest",
+    "Statement",
+    "Verdict",
+    "isolability",
+    "named",
+    "smallest_visible",
+]

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from calibrate.fit.held_out.splits import Split, by_place, last_block
+from calibrate.fit.held_out import Split, by_place, last_block
 from calibrate.model.effects.drivers import Drivers
 from calibrate.model.effects.gravity import point_of
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from calibrate.diagnose.doubts.folds import splits_of, units
 from calibrate.diagnose.state.linearised import State, Unseen, tame
-from calibrate.fit.held_out.splits import Split
+from calibrate.fit.held_out import Split
 from calibrate.model.sensors.encoder_difference import NAME as ENCODER_DIFFERENCE
 
 Floats = NDArray[np.float64]

@@ -23,7 +23,7 @@ from calibrate.diagnose.state.augmented import (
 from calibrate.diagnose.state.fitted import Fitted
 from calibrate.diagnose.state.session import Session, drivers_of
 from calibrate.errors import DataError
-from calibrate.fit.noise.shared_scatter import SharedScatter, levers_of
+from calibrate.fit.noise import SharedScatter, levers_of
 from calibrate.model.effects.catalogue import terms_of
 from calibrate.model.effects.drivers import Drivers
 from calibrate.model.effects.since_model import changes

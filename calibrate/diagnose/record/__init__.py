@@ -1,0 +1,1 @@
+"""diagnosis.json: its schema, and how it is read and written."""

@@ -19,7 +19,7 @@ from scipy.signal import lfilter
 
 from calibrate.diagnose.state.linearised import Rows
 from calibrate.diagnose.state.visible import Sight
-from calibrate.fit.noise.scatter import NU
+from calibrate.fit.noise import NU
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from calibrate.diagnose.state.assumed import Assumed
 from calibrate.diagnose.state.session import Session
 from calibrate.fit.joint_problem import JointProblem
-from calibrate.fit.noise.shared_scatter import SharedScatter
+from calibrate.fit.noise import SharedScatter
 from calibrate.model.arms.coupled_readings import by_readings, recoupled
 from calibrate.model.arms.serial import SerialArm
 from calibrate.model.effects.drivers import Drivers

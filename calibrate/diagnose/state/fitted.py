@@ -24,7 +24,7 @@ from calibrate.diagnose.state.noise_of_fit import (
 )
 from calibrate.diagnose.state.session import Session, drivers_of
 from calibrate.fit.identify.session import believed_sigma
-from calibrate.fit.noise.scatter import Scatter, likelihood_of
+from calibrate.fit.noise import Scatter, likelihood_of
 from calibrate.fit.solvers import (
     FAR_START,
     NEAR_START,

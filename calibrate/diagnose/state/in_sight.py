@@ -17,8 +17,7 @@ from numpy.typing import NDArray
 
 from calibrate.diagnose.state.augmented import Augmented
 from calibrate.diagnose.state.visible import VISIBLE
-from calibrate.fit.solvers import Fit, Loss, solve
-from calibrate.fit.solvers.linear import covariance_of, triangle_of
+from calibrate.fit.solvers import Fit, Loss, covariance_of, solve, triangle_of
 from calibrate.model.parameters import (
     Parameter,
     plausible_sizes,

@@ -10,7 +10,7 @@ from typing import Protocol, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from calibrate.fit.noise.scatter import sigma_about_zero
+from calibrate.fit.noise import sigma_about_zero
 from calibrate.model.effects.drivers import Drivers
 from calibrate.model.effects.term import Accepted, Term
 

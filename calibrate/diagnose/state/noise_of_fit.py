@@ -7,13 +7,7 @@ from numpy.typing import NDArray
 
 from calibrate.diagnose.state.augmented import Augmented
 from calibrate.fit.identify.session import believed_sigma
-from calibrate.fit.noise.scatter import Scatter, likelihood_of, scatter_of
-from calibrate.fit.noise.shared_scatter import (
-    SharedScatter,
-    levers_of,
-    shares_found,
-    witness_of,
-)
+from calibrate.fit.noise import Scatter, SharedScatter, levers_of, likelihood_of, scatter_of, shares_found, witness_of
 from calibrate.fit.solvers import Fit
 from calibrate.model.parameters import plausible_sizes
 from calibrate.model.problem import whitener_of

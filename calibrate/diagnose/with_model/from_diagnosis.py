@@ -14,7 +14,7 @@ from scipy.stats import chi2
 from acquisition.recording import Recording, Samples, readings_sha256
 from acquisition.recording.rig import ArmModel, rig_sha256
 from acquisition.recording.samples import measured_sha256
-from calibrate.apply.export.dh_csv import dh_table_of
+from calibrate.apply.export import dh_table_of
 from calibrate.apply.predicting import as_fitted
 from calibrate.diagnose.doubts.diagnosis import UNKNOWN, Diagnosis, Finding
 from calibrate.diagnose.doubts.findings import named
@@ -26,15 +26,15 @@ from calibrate.diagnose.search.stated_sizes import sizes_of
 from calibrate.diagnose.state.fitted import Fitted
 from calibrate.diagnose.state.noise_of_fit import freedom
 from calibrate.errors import DataError
-from calibrate.fit.accuracy.fit_statistics import against_stated
+from calibrate.fit.accuracy import against_stated
 from calibrate.fit.fit_plan import LossName, SolverName
-from calibrate.fit.held_out.held_out import beyond_sigma
+from calibrate.fit.held_out import beyond_sigma
 from calibrate.fit.identify.fit_report import sizes_of_noise
 from calibrate.fit.identify.record import left_out, noise_fields
 from calibrate.fit.identify.result import POSE, POSITION, alarms_of
 from calibrate.fit.identify.session import NEGLIGIBLE_RAD, about_of, joints_apart
-from calibrate.fit.noise.variance import TOLD, VarianceFactors
-from calibrate.fit.rank.identifiability import Identifiability, analyse
+from calibrate.fit.noise import TOLD, VarianceFactors
+from calibrate.fit.rank import Identifiability, analyse
 from calibrate.fit.solvers import Status, Stop
 from calibrate.fit.weighting import JOINT, Weighting
 from calibrate.model.effect_records import (

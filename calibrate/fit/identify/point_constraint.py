@@ -31,13 +31,7 @@ from calibrate.model.default_tolerance import links_of
 from calibrate.model.dual_psd_rig import laser_of
 from calibrate.model.kinematic_model import KinematicModel
 from calibrate.model.observations import Observations
-from calibrate.model.optics.laser import LaserMount
-from calibrate.model.optics.lines import (
-    CENTRED_M,
-    Lines,
-    distances,
-    nearest_point,
-)
+from calibrate.model.optics import CENTRED_M, LaserMount, Lines, distances, nearest_point
 from calibrate.model.parameters import Parameter, hold, start_values
 from calibrate.model.read_samples import observations
 from calibrate.model.rigid import cross

@@ -1,0 +1,22 @@
+"""How much a row counts. Sizes of noise by source (REML), rows as sources of noise, what instruments share with second
+encoders, robust scale. Weights of rows are made of these in calibrate/fit/weighting.py.
+"""
+
+from calibrate.fit.noise.scatter import NU, Scatter, likelihood_of, scatter_of, sigma_about_zero
+from calibrate.fit.noise.shared_scatter import SharedScatter, levers_of, shares_found, witness_of
+from calibrate.fit.noise.variance import TOLD, VarianceFactors, as_believed
+
+__all__ = [
+    "NU",
+    "TOLD",
+    "Scatter",
+    "SharedScatter",
+    "VarianceFactors",
+    "as_believed",
+    "levers_of",
+    "likelihood_of",
+    "scatter_of",
+    "shares_found",
+    "sigma_about_zero",
+    "witness_of",
+]

@@ -10,7 +10,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import fminbound
 from scipy.special import gammaln
 
 Floats = NDArray[np.float64]
@@ -114,6 +113,8 @@ def _through_joints(residual: Floats, by_joint: Floats, own_sigma: Floats) -> Sc
     def cost(log_ratio: float) -> float:
         axes, scale = spread(log_ratio)
         return _law(np.sum(turned / (scale * axes), axis=1), k) + float(np.sum(np.log(scale * axes)))
+
+    from scipy.optimize import fminbound  # a fit of geometry alone does without, and starts sooner
 
     best: float = fminbound(cost, LOG_RATIO[0], LOG_RATIO[1], xtol=0.05)  # pyright: ignore[reportAssignmentType]
     scale, ratio = spread(best)[1], np.exp(best)

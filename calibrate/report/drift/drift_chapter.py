@@ -6,7 +6,7 @@ from math import degrees
 import numpy as np
 
 from calibrate.diagnose.record.schema import DiagnosisFile, FindingRecord
-from calibrate.fit.rank.not_determined import in_plain_words
+from calibrate.fit.rank import in_plain_words
 from calibrate.model.model_file import ModelFile
 from calibrate.quantities import (
     DASH,

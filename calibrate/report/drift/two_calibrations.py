@@ -21,8 +21,7 @@ from acquisition.recording import Recording
 from acquisition.recording.rig import ArmModel, Joint, Rig, parse_rig
 from calibrate.diagnose.record.schema import DiagnosisFile
 from calibrate.errors import DataError
-from calibrate.fit.accuracy.fit_statistics import Alarm
-from calibrate.fit.accuracy.free_space import target_by_parameter
+from calibrate.fit.accuracy import Alarm, target_by_parameter
 from calibrate.model.converted_rig import rig_in_model
 from calibrate.model.model_file import Covariance, ModelFile, ModelParameter
 from calibrate.model.parameters import index_of

@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter, NullLocator
 from numpy.typing import NDArray
 
-from calibrate.fit.rank.identifiability import WEAK
+from calibrate.fit.rank import WEAK
 from calibrate.quantities import power_of_ten
 from calibrate.report.elements.html import Html, escaped
 from calibrate.report.elements.tones import Tone

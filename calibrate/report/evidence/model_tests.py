@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from math import nan, sqrt
 
-from calibrate.fit.accuracy.fit_statistics import Alarm
+from calibrate.fit.accuracy import Alarm
 from calibrate.model.model_file import Fields, ModelFile, UnseenRows
 
 

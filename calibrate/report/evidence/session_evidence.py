@@ -14,16 +14,15 @@ from numpy.typing import NDArray
 
 from acquisition.recording import Recording
 from acquisition.recording.rig import ArmModel, Rig
-from calibrate.apply.export.dh_csv import dh_arm, dh_table_of
-from calibrate.apply.export.identified import IdentifiedArm, identified_arm
+from calibrate.apply.export import IdentifiedArm, dh_arm, dh_table_of, identified_arm
 from calibrate.errors import DataError
-from calibrate.fit.accuracy.fit_statistics import spare_readings
+from calibrate.fit.accuracy import spare_readings
 from calibrate.fit.fit_plan import DEFAULT, parse_plan
 from calibrate.fit.identify.planned import rig_as_planned, samples_as_planned
 from calibrate.fit.identify.session import instruments_for_fit, standing_at
 from calibrate.fit.joint_problem import JointProblem
-from calibrate.fit.noise.variance import VarianceFactors, as_believed
-from calibrate.fit.rank.identifiability import analyse
+from calibrate.fit.noise import VarianceFactors, as_believed
+from calibrate.fit.rank import analyse
 from calibrate.fit.solvers import solve
 from calibrate.fit.weighting import Weighting
 from calibrate.model.arms.catalogue import arm_of

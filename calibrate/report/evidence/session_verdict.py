@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.special import fdtrc
 
 from calibrate.diagnose.record.schema import DiagnosisFile
-from calibrate.fit.accuracy.fit_statistics import Alarm, checks_nothing
+from calibrate.fit.accuracy import Alarm, checks_nothing
 from calibrate.fit.solvers import Status
 from calibrate.model.model_file import Fields, ModelFile, UnseenRows
 from calibrate.model.sensors.catalogue import kind_of

@@ -1,0 +1,1 @@
+"""Figures of a report: errors by joint and time, the rig, reflections, interactive scenes."""

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from calibrate.model.assumed_rig.assumed_rig import BelievedRig
+from calibrate.model.assumed_rig import BelievedRig
 from calibrate.model.dual_psd_rig import fixture_of
 from calibrate.model.observations import Observations
-from calibrate.model.optics.dual_psd import AXES
+from calibrate.model.optics import AXES
 from calibrate.model.rigid import pose_offset
 from calibrate.report.evidence.session_evidence import SpotSession
 

@@ -10,11 +10,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from calibrate.apply.export.nominal_table import cells, nominal_table
+from calibrate.apply.export import cells, nominal_table
 from calibrate.fit.identify.session import holds_spots
-from calibrate.fit.rank.identifiability import WEAK
-from calibrate.fit.rank.not_determined import in_plain_words, kind_of, reason_among
-from calibrate.fit.rank.observability import WELL_CONDITIONED
+from calibrate.fit.rank import WEAK, WELL_CONDITIONED, in_plain_words, kind_of, reason_among
 from calibrate.model.default_tolerance import said_of
 from calibrate.model.model_file import ModelFile, ModelParameter
 from calibrate.model.parameters import Parameter

@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 
 from acquisition.recording.rig import Rig
-from calibrate.fit.accuracy.fit_statistics import Alarm
+from calibrate.fit.accuracy import Alarm
 from calibrate.fit.weighting import JOINT
 from calibrate.model.model_file import FreeSpaceRecord, ModelFile, UnseenRows
 from calibrate.model.sensors.catalogue import SOURCES, kind_of

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibrate.diagnose.record.schema import DiagnosisFile
-from calibrate.fit.accuracy.free_space import (
+from calibrate.fit.accuracy import (
     FreeSpaceStatus,
     Scatter,
     Workspace,
@@ -24,9 +24,7 @@ from calibrate.fit.accuracy.free_space import (
     target_by_parameter,
     variance_of_scatter,
 )
-from calibrate.fit.rank.identifiability import Identifiability
-from calibrate.fit.rank.not_determined import in_plain_words
-from calibrate.fit.rank.unseen_along import analyse_along
+from calibrate.fit.rank import Identifiability, analyse_along, in_plain_words
 from calibrate.model.alignment import aligned_difference
 from calibrate.model.arms.rig_arm import limits_of
 from calibrate.model.kinematic_model import KinematicModel

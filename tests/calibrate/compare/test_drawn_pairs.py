@@ -11,8 +11,7 @@ from calibeam.results.comparison import compare
 from calibrate.compare.beside_simulation import beside
 from calibrate.compare.corrected import simulated_of
 from simulators.conceal.case_files import Made
-
-from .drawn_pairs import case_of, pair_of
+from tests.calibrate.compare.drawn_pairs import case_of, pair_of
 
 MOST_LINES = 25
 SEEDS = (4, 5, 6, 7, 8, 10)  # of arms whose rig file has rows

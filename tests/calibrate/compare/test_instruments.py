@@ -15,9 +15,8 @@ from calibrate.compare.seated import lengths_of
 from calibrate.diagnose.state.fitted import fit_geometry
 from calibrate.diagnose.state.session import session_of
 from calibrate.model.arms.rig_arm import RigArm
-
-from ..concealed import changed, recording_of
-from ..mixed_sessions import full_pose, truth_of
+from tests.calibrate.diagnose.concealed import changed, recording_of
+from tests.calibrate.diagnose.mixed_sessions import full_pose, truth_of
 
 Q = [f"q{j}_rad" for j in range(1, 7)]
 TURN = [f"r{axis}_rad" for axis in "xyz"]

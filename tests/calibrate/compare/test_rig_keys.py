@@ -7,7 +7,7 @@ import pytest
 from acquisition.recording.rig import parse_rig
 from calibrate.compare.rig_keys import rig_differences
 
-TEXT = (Path(__file__).parents[4] / "rigs" / "ur5e-dual-psd.toml").read_text(encoding="utf-8")
+TEXT = (Path(__file__).parents[3] / "rigs" / "ur5e-dual-psd.toml").read_text(encoding="utf-8")
 
 
 def differing(*changes):

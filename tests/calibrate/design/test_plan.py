@@ -15,8 +15,7 @@ from calibrate.design.information import information_of
 from calibrate.design.places import choose_places
 from calibrate.design.seen import seen_by
 from calibrate.errors import DataError
-
-from .conftest import RIG
+from tests.calibrate.design.conftest import RIG
 
 
 @pytest.fixture(scope="module")

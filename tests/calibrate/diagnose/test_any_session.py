@@ -8,8 +8,7 @@ from acquisition.recording import RecordingError, RigFileError, SamplesError, re
 from calibeam.results.diagnosis import diagnose_to_file
 from calibrate.diagnose.doubts.diagnosis import Verdict
 from calibrate.errors import DataError
-
-from .drawn_rigs import drawn
+from tests.calibrate.diagnose.drawn_rigs import drawn
 
 # small and quick ones of the first ten, another in test_stages.py; the 300 are for `make endure`
 DAILY, DAILY_ROWS = (2, 8), 40

@@ -17,8 +17,7 @@ from calibrate.model.checks.gross_error import BlunderKind
 from simulators.conceal.case import conceal
 from simulators.conceal.case_files import write_case
 from simulators.conceal.wanted import Wanted
-
-from .concealed import changed, recording_of
+from tests.calibrate.diagnose.concealed import changed, recording_of
 
 
 @pytest.fixture(scope="module")

@@ -6,8 +6,7 @@ import pytest
 from calibrate.diagnose.gross_errors_first import blunders_first
 from calibrate.errors import DataError
 from calibrate.model.checks.gross_error import BlunderKind
-
-from .concealed import changed, recording_of
+from tests.calibrate.diagnose.concealed import changed, recording_of
 
 
 @pytest.fixture(scope="module")

@@ -3,8 +3,7 @@
 import pytest
 
 from calibeam.results.diagnosis import diagnose_recording
-
-from .mixed_sessions import full_pose, spots_and_bar, tracker_and_cones, truth_of
+from tests.calibrate.diagnose.mixed_sessions import full_pose, spots_and_bar, tracker_and_cones, truth_of
 
 CASES = [
     pytest.param(full_pose, 3, "encoder-eccentricity", marks=pytest.mark.endure),

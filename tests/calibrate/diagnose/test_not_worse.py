@@ -17,8 +17,7 @@ from calibrate.diagnose.with_model.from_diagnosis import model_of_diagnosis
 from calibrate.model.effects.catalogue import missing_of
 from calibrate.model.sensors.encoder_difference import NAME as ENCODER_DIFFERENCE
 from simulators.conceal.wanted import FAMILIES
-
-from .concealed import recording_of
+from tests.calibrate.diagnose.concealed import recording_of
 
 REAL = Path(__file__).parents[4] / "shared" / "data"
 ROBOTS = ("ur5-tracker", "ur10-leica-a", "ur10-leica-b", "ur10-leica-d")

@@ -15,8 +15,7 @@ from calibrate.model.model_file import read_model
 from calibrate.report.evidence.model_tests import proofs
 from calibrate.report.evidence.session_evidence import session_evidence
 from calibrate.report.sections.zeros import zeros_of
-
-from .concealed import recording_of
+from tests.calibrate.diagnose.concealed import recording_of
 
 CASES = {
     "soft-joint": ("link", 11),

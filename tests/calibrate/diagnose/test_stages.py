@@ -18,8 +18,7 @@ from calibrate.diagnose.search.score import Removed
 from calibrate.diagnose.search.search import search
 from calibrate.diagnose.stages import NOT_YET, Stage, Stages
 from calibrate.errors import DataError
-
-from .drawn_rigs import drawn
+from tests.calibrate.diagnose.drawn_rigs import drawn
 
 SMALL = 4  # a drawn session with nothing in it that a diagnosis ends in a second
 

@@ -10,9 +10,8 @@ from calibrate.fit.identify.identify import identify
 from calibrate.fit.identify.record import record_of
 from calibrate.model.model_file import RigIdentity
 from calibrate.model.predict import Predictor
-
-from ..conftest import spot_samples
-from .conftest import RIGS
+from tests.calibrate.conftest import spot_samples
+from tests.calibrate.error_simulation.conftest import RIGS
 
 RIG = RIGS / "ur5e-dual-psd.toml"
 

@@ -13,8 +13,7 @@ from calibrate.error_simulation.error_plan import (
 )
 from calibrate.error_simulation.machine import machine_of
 from calibrate.errors import DataError
-
-from .conftest import RIGS
+from tests.calibrate.error_simulation.conftest import RIGS
 
 
 @pytest.fixture

@@ -6,8 +6,7 @@ from scipy.optimize import least_squares
 
 from calibrate.fit.solvers import NEAR_START, Status, solve
 from calibrate.model.parameters import Parameter
-
-from .known_minima import Known, powell_singular, rosenbrock, unknowns
+from tests.calibrate.fit.known_minima import Known, powell_singular, rosenbrock, unknowns
 
 
 def line(x, y, sigma, **more):

@@ -19,7 +19,7 @@ from calibrate.fit.solvers import Status, solve
 from calibrate.model.arms.catalogue import arm_of
 from calibrate.model.parameters import hold
 
-RIG = Path(__file__).parents[2] / "rigs" / "ur5e-dual-psd.toml"
+RIG = Path(__file__).parents[3] / "rigs" / "ur5e-dual-psd.toml"
 TOOL = np.array([0.021, -0.012, 0.083])
 TURN, SHIFT = Rotation.from_rotvec([0.3, -0.4, 2.2]), np.array([1.8, -0.6, 0.4])
 PAIR = tuple(f"psd2.{a}" for a in ("x", "y", "z", "roll", "pitch", "yaw"))

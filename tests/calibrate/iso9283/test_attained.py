@@ -10,9 +10,20 @@ from acquisition.recording.samples import measured_sha256
 from calibrate.apply.correct.corrected import Options, Wanted, correct
 from calibrate.errors import DataError
 from calibrate.iso9283.attained import evaluate
+from tests.calibrate.iso9283.tracked_six_joints import (
+    DEVICE,
+    DRAWN,
+    POINT_M,
+    REAL,
+    RIG_HERE,
+    RIG_TEXT,
+    cycles,
+    known,
+    planned_rad,
+    seen,
+)
 
 from ..correct.six_joints import inverse as inverse_kinematics
-from .tracked_six_joints import DEVICE, DRAWN, POINT_M, REAL, RIG_HERE, RIG_TEXT, cycles, known, planned_rad, seen
 
 Q = planned_rad()
 POSE = cycles(6)

@@ -156,7 +156,7 @@ def test_a_drum_is_found_from_lengths_and_refused_in_a_plane(points):
 
 @pytest.mark.parametrize("name", ["ur5-tracker", "ur10-leica-a", "ur10-leica-b", "ur10-leica-d"])
 def test_trackers_of_real_recordings_are_found_without_a_start(name):
-    folder = Path(__file__).parents[3] / "shared" / "data" / name
+    folder = Path(__file__).parents[4] / "shared" / "data" / name
     if not folder.is_dir():
         pytest.skip(f"the real recording {name} is not beside the project (../shared/data)")
     recording = read_folder(folder)

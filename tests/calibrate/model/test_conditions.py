@@ -23,7 +23,7 @@ CONES_M = np.array([[0.45, 0.1, 0.2], [0.2, 0.45, 0.35], [-0.3, 0.35, 0.3]])
 
 @pytest.fixture(scope="module")
 def rig():
-    drawn = load_rig(Path(__file__).parents[2] / "rigs" / "ur5e-dual-psd.toml")
+    drawn = load_rig(Path(__file__).parents[3] / "rigs" / "ur5e-dual-psd.toml")
     tool = msgspec.structs.replace(drawn.tool, point_m=tuple(POINT_M))
     return msgspec.structs.replace(drawn, tool=tool, tolerance=None)
 

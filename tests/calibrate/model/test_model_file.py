@@ -16,8 +16,7 @@ from calibrate.model.model_file import (
     read_model,
     write_model,
 )
-
-from .conftest import spot_samples
+from tests.calibrate.conftest import spot_samples
 
 
 @pytest.fixture(scope="module")

@@ -10,7 +10,7 @@ from calibrate.model.model_file import read_model
 from calibrate.model.older_models import with_present_names
 from calibrate.report.evidence.model_tests import proofs
 
-MODELS = Path(__file__).parents[1] / "golden" / "data" / "formats" / "models"
+MODELS = Path(__file__).parents[2] / "golden" / "data" / "formats" / "models"
 COORDINATES = {"position-mdh": 3, "full-pose": 3, "wire": 1, "seat-bar": 3, "spots-bar": 4}
 
 

@@ -13,8 +13,7 @@ from calibrate.fit.identify.identify import identify
 from calibrate.fit.identify.record import record_of
 from calibrate.model.model_file import RigIdentity
 from calibrate.model.predict import Predictor, predict
-
-from .conftest import spot_samples
+from tests.calibrate.conftest import spot_samples
 
 Q = np.array([[0.1, -1.2, 1.3, -0.8, 0.4, 0.2], [0.5, -1.0, 1.1, -0.3, 0.9, -0.6], [-0.7, -1.4, 0.9, 0.2, 0.3, 1.0]])
 TURN = (0.3, -0.4, 2.2)

@@ -9,7 +9,7 @@ from calibeam.motion.motion_inverse import MotionInverse
 from calibrate.model.arms.rig_arm import RigArm
 from calibrate.model.model_file import Covariance, ModelFile, RigIdentity
 
-WHOLE = (Path(__file__).parents[3] / "rigs" / "irb120-modbus.toml").read_text(encoding="utf-8")
+WHOLE = (Path(__file__).parents[4] / "rigs" / "irb120-modbus.toml").read_text(encoding="utf-8")
 RIG = WHOLE[: WHOLE.index("[fixture]")]  # the arm and its tool: the text is read anew with every prediction
 CHAIN = {"joint2.zero": 2e-3, "joint3.zero": -1.5e-3, "joint5.zero": 1e-3, "link2.length": 8e-4, "link3.twist": 1e-3}
 SIGMA = 1e-5

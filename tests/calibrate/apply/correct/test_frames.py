@@ -9,8 +9,7 @@ from calibrate.apply.correct.corrected import Arms, Options, taken_up
 from calibrate.apply.correct.frames import measured_frame
 from calibrate.errors import DataError
 from calibrate.model.model_file import write_model
-
-from .six_joints import drawn, model, postures, real
+from tests.calibrate.apply.correct.six_joints import drawn, model, postures, real
 
 Q = postures(6, seed=4)
 TOOL = np.eye(4)

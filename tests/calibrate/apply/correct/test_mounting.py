@@ -8,8 +8,7 @@ from acquisition.recording.rig import Rig, parse_rig
 from calibrate.apply.correct.mounting import mounting
 from calibrate.model.arms.rig_arm import RigArm
 from calibrate.model.predict import Predictor
-
-from .six_joints import RIG
+from tests.calibrate.apply.correct.six_joints import RIG
 
 ZERO_RAD = 4e-3
 NAMES = [f"joint{j}.zero" for j in range(1, 6)]

@@ -14,9 +14,9 @@ from calibrate.apply.correct.tables import read_poses
 from calibrate.apply.predicting import placed
 from calibrate.errors import DataError
 from calibrate.model.model_file import write_model
+from tests.calibrate.apply.correct.six_joints import CHAIN, SIGMA, drawn, inverse, model, postures, real
 
 from ..physics.two_joints import PLAY_RAD, two_joints
-from .six_joints import CHAIN, SIGMA, drawn, inverse, model, postures, real
 
 Q = postures(4)
 T = drawn().frames(Q)[:, -1]

@@ -19,7 +19,7 @@ from calibrate.model.arms.catalogue import arm_of
 from calibrate.model.arms.convert import convert
 from calibrate.model.parameters import values_by_name
 
-RIGS = Path(__file__).parents[3] / "rigs"
+RIGS = Path(__file__).parents[4] / "rigs"
 UR5E = load_rig(RIGS / "ur5e-dual-psd.toml")
 CMM = load_rig(RIGS / "arm-cmm-reference.toml")
 ARMS = {"ur5e": UR5E, "ur5e by craig": Rig(1, "mdh", convert(UR5E.arm, ArmModel.MDH).arm), "arm-cmm": CMM}

@@ -17,7 +17,7 @@ from calibrate.model.predict import Predictor
 
 from ..physics.two_joints import PLAY_RAD, REACH_M, two_joints
 
-MODELS = Path(__file__).parents[2] / "golden" / "data" / "formats" / "models"
+MODELS = Path(__file__).parents[3] / "golden" / "data" / "formats" / "models"
 ANY_MAKE = [form for form in FORMS if form.make is None]  # the others are for arms of one make
 OFF_UM = 1e6 * REACH_M * PLAY_RAD / 2.0  # half the play either way, at a stretched arm
 SAYS = "not carried: joint1-backlash: 250.0 µm rms, at most 250.0 µm"

@@ -10,8 +10,7 @@ from acquisition.recording.rig import parse_rig
 from calibeam.cli import run
 from calibrate.apply.export.export import export_model, form_named
 from calibrate.model.model_file import read_model
-
-from .tracked import HIDDEN_DEG, SIGMA_M, tracked
+from tests.calibrate.apply.export.tracked import HIDDEN_DEG, SIGMA_M, tracked
 
 OPEN = (0, 5)  # a turn of joint 1 is one of the base, of joint 6 one of the target: no tracker shows either
 

@@ -8,8 +8,7 @@ from calibrate.apply.correct.corrected import Options
 from calibrate.apply.programs.rewriting import correct_program, dialect_of
 from calibrate.errors import DataError
 from calibrate.model.rigid import inverse as inverse_of
-
-from .six_joints import drawn, inverse, model, postures
+from tests.calibrate.apply.correct.six_joints import drawn, inverse, model, postures
 
 Q = postures(1)
 FLANGE = drawn().frames(Q)[0, -1]

@@ -11,8 +11,7 @@ from calibrate.apply.correct.corrected import Options
 from calibrate.apply.programs.rewriting import correct_program, dialect_of
 from calibrate.errors import DataError
 from calibrate.model.model_file import write_model
-
-from .six_joints import drawn, inverse, model, postures, real
+from tests.calibrate.apply.correct.six_joints import drawn, inverse, model, postures, real
 
 TOOL = np.eye(4)
 NUMBER = re.compile(r"-?\d+\.\d{3,}")

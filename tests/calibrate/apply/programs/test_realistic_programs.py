@@ -11,8 +11,7 @@ from calibrate.apply.correct.corrected import Options
 from calibrate.apply.programs.rewriting import correct_program, dialect_of
 from calibrate.errors import DataError
 from calibrate.model.model_file import write_model
-
-from .six_joints import drawn, inverse, model, postures, real
+from tests.calibrate.apply.correct.six_joints import drawn, inverse, model, postures, real
 
 NUMBER = re.compile(r"-?\d+\.\d+")
 CONFIGURATION = re.compile(r"\[-?\d,-?\d,-?\d,0\],\[9E9")  # follows an axis that the correction takes over an edge

@@ -9,8 +9,7 @@ from msgspec import structs
 from acquisition.recording.samples import POSITION
 from calibeam.results.diagnosis import diagnose_recording
 from calibrate.model.arms.rig_arm import RigArm
-
-from .concealed import changed, recording_of
+from tests.calibrate.diagnose.concealed import changed, recording_of
 
 SIGMA_M = 1e-5
 

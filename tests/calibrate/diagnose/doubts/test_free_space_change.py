@@ -7,8 +7,7 @@ from calibrate.diagnose.search.bench import Bench
 from calibrate.diagnose.search.line_search import refined
 from calibrate.diagnose.state.fitted import fit_geometry
 from calibrate.diagnose.state.session import session_of
-
-from .concealed import recording_of
+from tests.calibrate.diagnose.concealed import recording_of
 
 
 def test_doubt_about_the_frames_of_base_and_tool_is_no_doubt_about_the_arm(tmp_path):

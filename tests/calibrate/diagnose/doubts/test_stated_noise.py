@@ -21,8 +21,7 @@ from calibrate.model.effects.term import Missing
 from simulators.conceal.case import conceal
 from simulators.conceal.case_files import write_case
 from simulators.conceal.wanted import Wanted
-
-from .concealed import changed
+from tests.calibrate.diagnose.concealed import changed
 
 SPEED = Missing("qd", "qd1_rad_s ...", "latency")
 SESSION = {"family": "tracker", "arm": "irb120", "samples": 120}

@@ -18,8 +18,7 @@ from calibrate.model.effects.curve import curve
 from calibrate.model.effects.form import Form
 from calibrate.model.effects.ports import Place, Port
 from calibrate.model.effects.term import Accepted, Missing, Shape
-
-from .conftest import Plain
+from tests.calibrate.diagnose.conftest import Plain
 
 SIZE_RAD = 1.5
 

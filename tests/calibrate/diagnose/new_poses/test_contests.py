@@ -15,8 +15,7 @@ from calibrate.diagnose.search.line_search import refined
 from calibrate.diagnose.search.score import scores
 from calibrate.diagnose.state.fitted import fit_geometry
 from calibrate.diagnose.state.session import session_of
-
-from .concealed import recording_of
+from tests.calibrate.diagnose.concealed import recording_of
 
 MEASURED, RANDOM = 60, 2
 

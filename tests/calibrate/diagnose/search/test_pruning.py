@@ -14,8 +14,7 @@ from calibrate.diagnose.search.pruning import (
 from calibrate.diagnose.search.searching import Search, null_at
 from calibrate.model.effects.ports import Place, Port
 from calibrate.model.effects.term import Shape
-
-from .conftest import Plain
+from tests.calibrate.diagnose.conftest import Plain
 
 
 def two_columns(world, rng, apart, amount):

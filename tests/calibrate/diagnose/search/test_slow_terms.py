@@ -13,8 +13,7 @@ from calibrate.diagnose.search.searching import Search
 from calibrate.diagnose.state.fitted import fit_geometry
 from calibrate.diagnose.state.session import session_of
 from calibrate.model.effects.time_laws import BEHIND, FOR_A_WHILE
-
-from .concealed import recording_of
+from tests.calibrate.diagnose.concealed import recording_of
 
 
 def slip(session, joint):

@@ -10,8 +10,7 @@ from calibrate.diagnose.state.fitted import fit_geometry
 from calibrate.diagnose.state.session import session_of
 from calibrate.model.effects.loads import states_masses
 from calibrate.model.effects.term import Accepted, Size, plain
-
-from .concealed import recording_of
+from tests.calibrate.diagnose.concealed import recording_of
 
 CAUSE = "backlash"
 

@@ -3,8 +3,7 @@
 import numpy as np
 
 from calibrate.diagnose.doubts.doubt import MOST, thinned
-
-from .conftest import World
+from tests.calibrate.diagnose.conftest import World
 
 SAMPLES = MOST // World().channels  # of so many rows each
 

@@ -15,8 +15,7 @@ from calibrate.diagnose.state.in_sight import in_sight
 from calibrate.diagnose.state.session import session_of
 from calibrate.fit.solvers import Stop
 from calibrate.model.effects.term import Accepted
-
-from .concealed import recording_of
+from tests.calibrate.diagnose.concealed import recording_of
 
 WANTED = {"family": "tracker", "seed": 31, "samples": 120, "arm": "irb120", "defects": ("encoder-eccentricity",)}
 NOTHING = np.zeros(0)

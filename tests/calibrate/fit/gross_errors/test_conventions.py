@@ -8,8 +8,7 @@ from calibrate.fit.gross_errors.degrees import beyond_limits
 from calibrate.model.checks.gross_error import BlunderKind
 from calibrate.model.checks.rough_fit import rough_fit
 from calibrate.model.sensors.position import PositionWitness
-
-from .conftest import POINT, flange
+from tests.calibrate.fit.gross_errors.conftest import POINT, flange
 
 
 def judged(q, position_m, point_m=POINT):

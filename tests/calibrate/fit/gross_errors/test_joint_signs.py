@@ -8,8 +8,7 @@ from acquisition.recording.files import brief
 from calibrate.fit.gross_errors.conventions import wrong_convention
 from calibrate.model.checks.gross_error import BlunderKind
 from calibrate.model.sensors.position import PositionWitness
-
-from .conftest import NOISE, POINT, flange
+from tests.calibrate.fit.gross_errors.conftest import NOISE, POINT, flange
 
 # d, a, alpha of a six-axis arm whose links 2 and 3 move in one plane, as KUKA's, ABB's and FANUC's do (IRB 120)
 PLANAR = np.array(

@@ -9,8 +9,7 @@ from scipy.spatial.transform import Rotation
 from calibrate.fit.gross_errors.bad_rows import bad_rows
 from calibrate.model.checks.gross_error import BlunderKind
 from calibrate.model.checks.other_session import rows_of_another_session, sessions_apart
-
-from .conftest import NOISE, POINT, flange
+from tests.calibrate.fit.gross_errors.conftest import NOISE, POINT, flange
 
 
 def test_honest_rows_are_left_alone(scene):

@@ -11,8 +11,7 @@ from calibrate.model.sensors.full_pose import OrientationWitness
 from calibrate.model.sensors.position import PositionWitness
 from calibrate.model.sensors.seat import SeatWitness
 from calibrate.model.sensors.wire import WireWitness
-
-from .conftest import POINT, flange
+from tests.calibrate.fit.gross_errors.conftest import POINT, flange
 
 DRUM = np.array([1.1, -0.9, 0.2])
 

@@ -10,8 +10,7 @@ from calibrate.fit.fit_plan import DEFAULT, FitPlan
 from calibrate.fit.identify.identify import identify
 from calibrate.fit.identify.session import instruments_for_fit
 from calibrate.model.default_tolerance import PAIR, WIDE, said_of
-
-from ..conftest import spot_samples
+from tests.calibrate.conftest import spot_samples
 
 OFF_M, OFF_RAD = np.array([1.1e-4, -0.7e-4, 0.9e-4]), np.array([1.2e-3, -0.8e-3, 1.4e-3])
 BRACKET = tuple(f"psd2.{a}" for a in ("x", "y", "z", "roll", "pitch", "yaw"))

@@ -8,8 +8,7 @@ from acquisition.recording import Samples
 from calibrate.errors import DataError
 from calibrate.fit.identify.identify import identify
 from calibrate.model.checks.gross_error import BlunderKind
-
-from .conftest import Session, changed, table
+from tests.calibrate.fit.identify.conftest import Session, changed, table
 
 POSITION = ("x_m", "y_m", "z_m")
 

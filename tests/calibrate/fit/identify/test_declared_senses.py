@@ -10,8 +10,7 @@ from scipy.spatial.transform import Rotation
 from acquisition.recording.rig import parse_rig
 from calibrate.errors import DataError
 from calibrate.fit.identify.identify import identify
-
-from .conftest import table
+from tests.calibrate.fit.identify.conftest import table
 
 X, Y, Z = np.eye(3)
 TOOL_M = np.array([0.03, 0.02, 0.06])

@@ -10,9 +10,8 @@ from calibrate.fit.identify.identify import identify
 from calibrate.fit.solvers import Status
 from calibrate.model.arms.convert import convert
 from calibrate.model.predict import Predictor, predict
-
-from ..conftest import spot_samples
-from .conftest import BAR_M, table
+from tests.calibrate.conftest import spot_samples
+from tests.calibrate.fit.identify.conftest import BAR_M, table
 
 USABLE = (Status.CONVERGED, Status.RANK_DEFICIENT)
 CONES_M = np.array([[0.45, 0.1, 0.2], [0.2, 0.45, 0.35], [-0.3, 0.35, 0.3]])

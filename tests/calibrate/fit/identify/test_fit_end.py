@@ -14,8 +14,7 @@ from calibrate.fit.identify.record import record_of
 from calibrate.fit.identify.rounds import settled_fit
 from calibrate.fit.solvers import Status, Stop
 from calibrate.model.model_file import RigIdentity, read_model, write_model
-
-from .conftest import table
+from tests.calibrate.fit.identify.conftest import table
 
 NOISE_M = 1e-5
 HEAD = 'schema = 1\nshare = 0\nsolver = "dog-leg"\n[dog-leg]\n'

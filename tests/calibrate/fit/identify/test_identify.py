@@ -11,8 +11,7 @@ from calibrate.fit.identify.identify import identify
 from calibrate.fit.solvers import Status
 from calibrate.model.checks.gross_error import BlunderKind
 from calibrate.model.predict import Predictor, predict
-
-from .conftest import BAR_M, Session, table
+from tests.calibrate.fit.identify.conftest import BAR_M, Session, table
 
 TRACKER_M = 1e-5
 

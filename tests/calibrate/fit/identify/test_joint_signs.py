@@ -11,8 +11,7 @@ from calibrate.fit.identify.identify import identify
 from calibrate.fit.identify.session import instruments_for_fit
 from calibrate.model.arms.catalogue import arm_of
 from calibrate.model.parameters import start_values
-
-from .conftest import SHIFT, TURN, changed, table
+from tests.calibrate.fit.identify.conftest import SHIFT, TURN, changed, table
 
 TOOL = np.array([0.03, 0.0, 0.08])
 POSITION = ("x_m", "y_m", "z_m")

@@ -12,8 +12,7 @@ from calibrate.fit.identify.identify import identify
 from calibrate.fit.identify.rounds import coarse_start, settled_fit
 from calibrate.fit.identify.session import instruments_for_fit
 from calibrate.fit.solvers import Status
-
-from ..conftest import spot_samples
+from tests.calibrate.conftest import spot_samples
 
 # Beside those of tests/golden. Zeros of a truth as far off as those of 25 and 29 have every pair of conventions
 # tried, for seconds; of such truths the daily run has two, in test_few_samples_stay_honest.

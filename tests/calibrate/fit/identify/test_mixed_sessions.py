@@ -14,8 +14,7 @@ from calibrate.fit.fit_plan import FitPlan
 from calibrate.fit.identify.identify import identify
 from calibrate.fit.solvers import Status
 from calibrate.model.predict import Predictor, predict
-
-from .conftest import SHIFT, TOOL, TURN, Session
+from tests.calibrate.fit.identify.conftest import SHIFT, TOOL, TURN, Session
 
 SPOTS = ("psd1_x_m", "psd1_y_m", "psd2_x_m", "psd2_y_m")
 DUAL_PSD, POSITION = "dual-psd", "position"

@@ -17,8 +17,7 @@ from calibrate.fit.fit_plan import (
 from calibrate.fit.identify.identify import identify
 from calibrate.fit.identify.planned import rig_as_planned
 from calibrate.model.predict import Predictor, predict
-
-from .conftest import Session, table
+from tests.calibrate.fit.identify.conftest import Session, table
 
 NOISE_M = 1e-5
 AXES = ("x_m", "y_m", "z_m")

@@ -15,8 +15,7 @@ from calibrate.fit.identify.session import instruments_for_fit
 from calibrate.fit.solvers import solve
 from calibrate.model.checks.gross_error import BlunderKind
 from calibrate.model.parameters import hold, plausible_sizes
-
-from .conftest import changed
+from tests.calibrate.fit.identify.conftest import changed
 
 POSITION = ("x_m", "y_m", "z_m")
 

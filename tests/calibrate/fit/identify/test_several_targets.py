@@ -15,8 +15,7 @@ from calibrate.fit.instruments import instruments_of
 from calibrate.model.arms.catalogue import arm_of
 from calibrate.model.parameters import start_values
 from calibrate.model.predict import Predictor, predict
-
-from .conftest import SHIFT, TOOL, TURN, changed, table
+from tests.calibrate.fit.identify.conftest import SHIFT, TOOL, TURN, changed, table
 
 NOISE_M = 2e-5
 TRUE_M = {1: TOOL, 2: np.array([-0.071, 0.043, 0.061]), 7: np.array([0.012, -0.084, 0.072])}

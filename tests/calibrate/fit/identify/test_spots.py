@@ -9,9 +9,8 @@ from calibrate.errors import DataError
 from calibrate.fit.fit_plan import FitPlan
 from calibrate.fit.identify.identify import identify, without_blunders
 from calibrate.model.checks.gross_error import BlunderKind
-
-from ..conftest import spot_samples
-from .conftest import changed
+from tests.calibrate.conftest import spot_samples
+from tests.calibrate.fit.identify.conftest import changed
 
 
 @pytest.fixture(scope="module")

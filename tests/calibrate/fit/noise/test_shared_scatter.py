@@ -14,8 +14,7 @@ from calibrate.fit.fit_plan import FitPlan
 from calibrate.fit.identify.rounds import settled_fit
 from calibrate.fit.identify.session import instruments_for_fit
 from calibrate.model.effects.term import Accepted
-
-from .conftest import spot_samples
+from tests.calibrate.conftest import spot_samples
 
 SEATING_RAD, OWN_RAD, PSD_M, ROWS = 10e-6, 2e-6, 2e-6, 60
 SOFT = ("joint2.angle", ("gravity_torque2",), "linear", None, "joint-compliance", "")

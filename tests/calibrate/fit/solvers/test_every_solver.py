@@ -25,8 +25,7 @@ from calibrate.model.placement.target import Target
 from calibrate.model.problem import Problem
 from calibrate.model.rigid import transform
 from calibrate.model.sensors.position import Position
-
-from ..known_minima import Known, bent_valley, powell_singular, rosenbrock, unknowns
+from tests.calibrate.fit.known_minima import Known, bent_valley, powell_singular, rosenbrock, unknowns
 
 POSITION_SIGMA_M = 20e-6
 TIGHT = DogLegRules(e2=1e-12, kmax=500)  # beyond what any measurement needs, to compare with scipy

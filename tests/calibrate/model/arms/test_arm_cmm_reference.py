@@ -8,7 +8,7 @@ import pytest
 from acquisition.recording.rig import ArmModel, load_rig
 from calibrate.model.arms.catalogue import arm_of
 
-RIG = Path(__file__).parents[3] / "rigs" / "arm-cmm-reference.toml"
+RIG = Path(__file__).parents[4] / "rigs" / "arm-cmm-reference.toml"
 # T[i-1,i](0) of the paper, mm, row by row
 PAPER = """
 1 0 0 0 / 0 1 0 0 / 0 0 1 0

@@ -11,7 +11,7 @@ from calibrate.model.arms.convert import convert
 from calibrate.model.arms.table import NearParallel
 from calibrate.model.parameters import values_by_name
 
-RIGS = Path(__file__).parents[3] / "rigs"
+RIGS = Path(__file__).parents[4] / "rigs"
 UR5E = load_rig(RIGS / "ur5e-dual-psd.toml").arm
 CMM = load_rig(RIGS / "arm-cmm-reference.toml").arm
 MODELS = tuple(ArmModel)

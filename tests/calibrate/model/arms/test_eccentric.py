@@ -13,7 +13,7 @@ from calibrate.errors import DataError
 from calibrate.model.arms.catalogue import arm_of
 from calibrate.model.arms.eccentric import EccentricArm, with_discs
 
-RIG = load_rig(Path(__file__).parents[3] / "rigs" / "arm-cmm-reference.toml")
+RIG = load_rig(Path(__file__).parents[4] / "rigs" / "arm-cmm-reference.toml")
 STEP = 1e-6
 
 

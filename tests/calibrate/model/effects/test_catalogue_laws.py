@@ -15,8 +15,7 @@ from calibrate.model.effects.form import Form
 from calibrate.model.effects.ports import Place
 from calibrate.model.effects.term import UNITS, Shape
 from simulators.conceal.wanted import FAMILIES
-
-from .conftest import full_session
+from tests.calibrate.model.effects.conftest import full_session
 
 # The published lists of docs/formats.md.
 PORTS = re.compile(

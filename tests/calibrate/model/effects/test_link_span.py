@@ -14,8 +14,7 @@ from calibrate.model.effects.link_span import link_vectors
 from calibrate.model.effects.link_thermal_growth import EFFECT as GROWTH
 from calibrate.model.effects.ports import Perturbation
 from calibrate.model.with_effects.ported_chain import flange_twists, perturbed_frames
-
-from .conftest import full_session
+from tests.calibrate.model.effects.conftest import full_session
 
 NOTHING = np.zeros(0)
 

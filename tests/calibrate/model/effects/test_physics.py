@@ -25,8 +25,7 @@ from calibrate.model.effects.seat_moved import EFFECT as SEAT_MOVED
 from calibrate.model.effects.term import Shape, Size
 from calibrate.model.effects.tool_sag import EFFECT as SAG
 from calibrate.model.with_effects.ported_chain import perturbed_frames
-
-from .conftest import full_session
+from tests.calibrate.model.effects.conftest import full_session
 
 NOTHING = np.zeros(0)
 

@@ -14,8 +14,7 @@ from calibrate.model.effects.joint_compliance import EFFECT as JOINT
 from calibrate.model.effects.link_bending import EFFECT as LINK
 from calibrate.model.effects.loads import MASS_SHARE, doubtful_rigs, stated_masses
 from calibrate.model.effects.psd_gain import EFFECT as GAIN
-
-from .conftest import full_session
+from tests.calibrate.model.effects.conftest import full_session
 
 NOTHING = np.zeros(0)
 

@@ -10,8 +10,7 @@ from calibrate.apply.predicting import flange_with_physics
 from calibrate.model.effects.ports import Perturbation
 from calibrate.model.predict import Predictor
 from calibrate.model.with_effects.acting import arm_in, flange_frames
-
-from .two_joints import RIG, two_joints
+from tests.calibrate.model.with_effects.two_joints import RIG, two_joints
 
 DISC_RAD = 2e-3
 Q_RAD = np.array([[0.3, -0.7], [1.1, 0.4], [-2.0, 1.5]])

@@ -9,8 +9,7 @@ from calibrate.apply.predicting import predict_with_physics
 from calibrate.model.effect_records import Effect, EffectParameter
 from calibrate.model.effects.loads import UNSTATED_CENTRE_M
 from calibrate.model.with_effects.applied import conditions_of_effects
-
-from .two_joints import two_joints
+from tests.calibrate.model.with_effects.two_joints import two_joints
 
 SOFT_RAD_NM, ARM_M, LOAD_KG, G = 1e-5, 0.5, 2.0, 9.81
 JOINT = """

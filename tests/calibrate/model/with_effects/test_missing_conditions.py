@@ -7,8 +7,7 @@ import pytest
 from acquisition.recording import Samples
 from calibrate.apply.predicting import predict_with_physics
 from calibrate.errors import DataError
-
-from .two_joints import PLAY_RAD, REACH_M, SIGMA_RAD, two_joints
+from tests.calibrate.model.with_effects.two_joints import PLAY_RAD, REACH_M, SIGMA_RAD, two_joints
 
 
 @pytest.fixture

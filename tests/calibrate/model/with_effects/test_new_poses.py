@@ -16,8 +16,7 @@ from calibrate.model.with_effects.new_poses import (
     extended,
     moves_tool,
 )
-
-from .concealed import recording_of
+from tests.calibrate.diagnose.concealed import recording_of
 
 AGAIN = 10
 BY_POSES = 0.1  # of a term's size: columns chosen by the poses are nearly, not exactly, the same

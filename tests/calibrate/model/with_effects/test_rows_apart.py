@@ -12,8 +12,7 @@ from acquisition.recording import Samples
 from calibrate.apply.predicting import predict_with_physics
 from calibrate.model.effects.catalogue import EFFECTS, terms_of
 from calibrate.model.with_effects.applied import recorded_conditions
-
-from .test_conditions_of_catalogue import carrying, known, listed
+from tests.calibrate.model.with_effects.test_conditions_of_catalogue import carrying, known, listed
 
 MANY, FEW = 12, 1  # rows: the first once moved the mean so far that a prediction was refused
 STEADY_DEGC = 0.8  # of the recorded range, far from its mean

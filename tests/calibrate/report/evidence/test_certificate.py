@@ -19,7 +19,7 @@ from calibrate.model.model_file import ModelParameter
 from calibrate.report.elements.html import Html, page
 from calibrate.report.sections.summary import certificate
 
-RIG = Path(__file__).parents[3] / "rigs" / "ur5e-dual-psd.toml"
+RIG = Path(__file__).parents[4] / "rigs" / "ur5e-dual-psd.toml"
 SITE = """
 [site]
 operator = "A. Measurer"
