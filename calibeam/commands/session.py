@@ -25,7 +25,7 @@ from calibeam.guided.recorded import encoder_address, is_guided
 from calibeam.guided.run import plan_of, run_guided
 from calibeam.live.feed import SILENT, Feed
 from calibeam.sessions.job import EarlierParts, Job, new_place, read_earlier_parts, with_place, with_places
-from calibeam.sessions.run import run_session
+from calibeam.sessions.with_detectors import WithDetectors
 from calibeam.site_log import logged
 from drivers.clock import SystemClock
 
@@ -271,12 +271,12 @@ def _session_of_robot(wanted: Wanted, robot: RobotOptions, page: PageOptions, co
     earlier = _earlier(job, go_on=robot.continue_, place=robot.place)
     agrees = robot.yes or (control is not None and asking is None and moves_nothing_real(job.addresses.robot))
     with _page(wanted.rig, page, console) as feed:
-        run_session(job, console, earlier, feed, asking=asking, agrees=agrees, stands=robot.stands)
+        WithDetectors(job, console, earlier, feed, asking=asking, agrees=agrees, stands=robot.stands).run()
 
 
 def _session_with_tracker(wanted: Wanted, tracker: TrackerOptions, page: PageOptions, robot: RobotOptions) -> None:
     """The session of a driven arm whose target a tracker measures."""
-    from calibeam.sessions.with_tracker import TrackedJob, run_tracked
+    from calibeam.sessions.with_tracker import TrackedJob, WithTracker
 
     rig, console, control = wanted.rig, Console(), wanted.emulators.address()
     check_tracked_session(rig)
@@ -290,7 +290,7 @@ def _session_with_tracker(wanted: Wanted, tracker: TrackerOptions, page: PageOpt
         rig, wanted.text, wanted.out, addresses, plan, tracker.poses, wanted.seed, plan_text, robot.continue_
     )
     with _page(rig, page, console) as feed:
-        run_tracked(job, console, feed, asking=asking, agrees=agreed)
+        WithTracker(job, console, feed, asking=asking, agrees=agreed).run()
 
 
 def _session_by_hand(wanted: Wanted, hand: HandOptions, console: Console) -> None:
