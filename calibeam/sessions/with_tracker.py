@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from rich.progress import Progress as Bar
 
 from acquisition.errors import AcquisitionError
-from acquisition.recording import Event, RecordingError, RecordingWriter, RigFileError, read
-from acquisition.recording.mcap import differs, next_part, parts
+from acquisition.recording import Event, RecordingError, RecordingWriter, RigFileError
+from acquisition.recording.mcap import differs, next_part
 from acquisition.recording.pose_plan import PlannedBlock, PlannedPose, PosePlan
 from acquisition.recording.rig import Rig
 from acquisition.session.control import RunState
@@ -30,7 +30,7 @@ from calibeam.motion.reachable_poses import candidates_of, way_is_clear
 from calibeam.outcome import PartialResult
 from calibeam.printing.progress import progress_bar
 from calibeam.rig_files import of_one_point
-from calibeam.sessions.job import GO_ON, PLAN_NOTE, SEED_NOTE, plan_sha256
+from calibeam.sessions.job import GO_ON, PLAN_NOTE, SEED_NOTE, begun_in, plan_sha256
 from calibeam.sessions.keys import Keys
 from calibeam.sessions.measure import control_of
 from calibeam.sessions.person import Person
@@ -82,9 +82,7 @@ def taken_before(job: TrackedJob) -> TakenBefore:
     notes = {SEED_NOTE: str(job.seed), POSES_NOTE: str(job.poses)}
     if job.plan is not None:
         notes = {PLAN_NOTE: plan_sha256(job.plan_text)}
-    each = [read(path) for path in parts(job.out)] if job.go_on else []
-    if job.go_on and not each:
-        raise RecordingError(f"{job.out}: no session to go on with; leave --continue out, or give the folder of one")
+    each = begun_in(job.out) if job.go_on else []
     if each:
         if said := differs(each[-1].rig, job.rig):
             raise RecordingError(f"{job.out}: its session was of another rig: {said}; begin one with another --out")
