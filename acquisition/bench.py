@@ -1,7 +1,7 @@
 """What servo and session see of the devices, whether wires or a world in this process lie below: move, look, stop."""
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,19 +23,25 @@ class Spot:
 
 
 @dataclass(frozen=True)
-class Look:
-    """One settled reading of everything, averaged over the same dwell."""
+class ArmReading:
+    """One settled reading of everything beside the instrument, averaged over the same dwell."""
 
     host_s: float
-    t_s: float  # since the start of the session, by the PSD box's clock
+    t_s: float  # since the start of the session, by the instrument's clock
     q_rad: Floats  # (joint,) as the controller reports
     qd_rad_s: Floats  # (joint,)
     cmd_rad: Floats  # (joint,) as commanded
     encoder_rad: Floats | None  # (joint,) link-side encoders
-    psd1: Spot
-    psd2: Spot
     temperatures_degC: dict[str, float]
     settled: bool
+
+
+@dataclass(frozen=True)
+class Look(ArmReading):
+    """A reading of the beam on two faces."""
+
+    psd1: Spot
+    psd2: Spot
     window_s: tuple[float, float] | None = None  # first and last PSD sample in it, by the box's clock
     settle_s: float | None = None  # from the moment of looking until the readings had settled; None: not known
 
@@ -49,21 +55,28 @@ class Look:
         return pair if first == 1 else (pair[1], pair[0])
 
 
-class Bench(Protocol):
+Read = TypeVar("Read", bound=ArmReading, covariant=True)
+
+
+class ReadingBench(Protocol[Read]):
     """The devices, as few verbs. Raises DeviceError; every call ends."""
 
     def move(self, q_rad: Floats) -> None:
         """Go there and stand still."""
         ...
 
-    def look(self, dwell_s: float) -> Look:
+    def look(self, dwell_s: float) -> Read:
         """Wait until the readings have settled, then average `dwell_s` of device time."""
-        ...
-
-    def place_fixture(self, placement: int) -> None:
-        """Have the fixture stand at this place: asks the operator, or the emulated world."""
         ...
 
     def stop(self) -> None:
         """Stop the arm, from any thread and in any state."""
+        ...
+
+
+class Bench(ReadingBench[Look], Protocol):
+    """The devices of a beam on two faces."""
+
+    def place_fixture(self, placement: int) -> None:
+        """Have the fixture stand at this place: asks the operator, or the emulated world."""
         ...

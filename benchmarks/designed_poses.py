@@ -18,7 +18,7 @@ from acquisition.recording import Recording, RecordingWriter, read
 from acquisition.recording.pose_plan import PosePlan
 from acquisition.recording.rig import Rig, load_rig, plain_rig, rig_sha256, rig_text
 from acquisition.session.plan import PlanOptions
-from acquisition.session.planned import PlannedSession
+from acquisition.session.session import Session
 from benchmarks.slices import Slices
 from calibeam.devices.recorder import RecordingJournal
 from calibeam.learner import FittedLearner
@@ -101,8 +101,8 @@ def _error_m(rig_file: Path, rig: Rig, plan: PosePlan, seed: int) -> tuple[float
         with RecordingWriter(path, rig_text=rig_text(rig_file), software="benchmark", clock=clock) as writer:
             home_rad = np.array(rig.motion.home_rad)
             journal = RecordingJournal(writer, clock)
-            session = PlannedSession(bench, FittedLearner(rig), journal, PlanOptions(seed=seed), home_rad)
-            kept = len(session.run(plan).samples)
+            session = Session(bench, FittedLearner(rig), journal, PlanOptions(seed=seed), home_rad)
+            kept = len(session.take_planned(plan).samples)
         recording = read(path)
     joints = rig.arm.joints
     limits = [j.lower_rad for j in joints], [j.upper_rad for j in joints]

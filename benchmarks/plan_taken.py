@@ -14,7 +14,6 @@ from acquisition.recording import Recording, RecordingWriter, Samples, read
 from acquisition.recording.pose_plan import read_pose_plan
 from acquisition.recording.rig import load_rig, plain_rig, rig_text
 from acquisition.session.plan import PlanOptions
-from acquisition.session.planned import PlannedSession
 from acquisition.session.session import Session
 from calibeam.devices.recorder import RecordingJournal
 from calibeam.learner import FittedLearner
@@ -87,8 +86,8 @@ def _planned(rig_file: Path, path: Path, world: World, plan: Path) -> Recording:
     rig, clock = load_rig(rig_file), _WorldClock(world)
     with RecordingWriter(path, rig_text=rig_text(rig_file), software="benchmark", clock=clock) as writer:
         journal, home_rad = RecordingJournal(writer, clock), np.array(rig.motion.home_rad)
-        session = PlannedSession(_bench(rig_file, world), FittedLearner(rig), journal, PlanOptions(), home_rad)
-        session.run(read_pose_plan(plan, rig))
+        session = Session(_bench(rig_file, world), FittedLearner(rig), journal, PlanOptions(), home_rad)
+        session.take_planned(read_pose_plan(plan, rig))
     return read(path)
 
 

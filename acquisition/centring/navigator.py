@@ -18,7 +18,7 @@ from acquisition.centring.loop import Centring, Limits, centre
 from acquisition.centring.search import Found, Search
 from acquisition.centring.strategies import REGISTERED, CentringChoice, fixture_after
 from acquisition.errors import NoLightError, SpotLostError, UnreachableError
-from acquisition.session.records import Journal, Learner
+from acquisition.session.records import Events, Learner
 
 Floats = NDArray[np.float64]
 
@@ -44,7 +44,7 @@ class Navigator:
         self,
         bench: Bench,
         learner: Learner,
-        journal: Journal,
+        journal: Events,
         home_rad: Floats,
         seed: int,
         sight: Sight | None = None,
@@ -84,10 +84,14 @@ class Navigator:
         """
         self._placement = placement
         target, T = BeamTarget(first, spots_m, FINDING_STAND_OFF_M, 0.0), self._learner.T_base_fixture(placement)
-        if self._dark(first):
+        if self.dark(first):
             self._search(first, T)
         self._stand_in_light(target, T)
         return self.q_rad
+
+    def dark(self, first: int) -> bool:
+        """Whether a face, or both, have no light where the arm stands."""
+        return not all(self._bench.look(GLANCE_S).lit(first))
 
     def centre_here(self, placement: int, target: BeamTarget, limits: Limits) -> Centring:
         """From where the arm stands: search the light if it is dark, then bring the spots to the target's.
@@ -96,7 +100,7 @@ class Navigator:
         """
         self._placement = placement
         T = self._lit[-1].T_base_fixture if self._lit else self._learner.T_base_fixture(placement)
-        if self._dark(target.first):
+        if self.dark(target.first):
             self._search(target.first, T)
         return self._centre(target, T, limits)
 
@@ -111,7 +115,7 @@ class Navigator:
             return self._centre(target, self._land(target), limits or NEAR)
         except (SpotLostError, UnreachableError):
             self.move(back.q_rad)
-            if self._dark(target.first):  # the fixture was moved, or the laser is off
+            if self.dark(target.first):  # the fixture was moved, or the laser is off
                 self._stand_in_light(back.target, back.T_base_fixture)
             raise
 
@@ -134,9 +138,9 @@ class Navigator:
         NoLightError when nothing is found, or when it is lost at once: then no lit pose is left to go back to.
         """
         aimed, fixture = target, T
-        if self._dark(target.first) and self._sight is not None:
+        if self.dark(target.first) and self._sight is not None:
             aimed, fixture = self._aim(self._sight, target, T)
-        if self._dark(target.first):
+        if self.dark(target.first):
             self._search(target.first, fixture)
         self._lit = []
         try:
@@ -179,9 +183,6 @@ class Navigator:
         here = fixture_after(run, strategy, arm, optics, T, target.first)
         self._lit.append(LitPose(target, self.q_rad, here))
         return run
-
-    def _dark(self, first: int) -> bool:
-        return not all(self._bench.look(GLANCE_S).lit(first))
 
     def _seen(self, T: Floats) -> Floats:
         """The fixture as the camera sees it from here; as assumed where it does not, or where there is none."""

@@ -6,17 +6,20 @@ The learner betters the assumed rig during a session. It is passed in, because i
 import enum
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
-from typing import Any, Protocol
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.bench import Look, Spot
+from acquisition.bench import ArmReading, Look, Spot
 from acquisition.centring.believed import BelievedArm, FixtureOptics
 from acquisition.session.plan import PoseKey
 
 Floats = NDArray[np.float64]
 Cell = float | int | str | None
+
+
+NO_CELLS: Mapping[str, Cell] = {}
 
 
 @dataclass(frozen=True)
@@ -31,20 +34,29 @@ class Sample:
     centred: bool
 
     def row(self) -> dict[str, Cell]:
-        """Column name -> value; names of the session-folder format, version 1, plus the sigmas of the means."""
-        look = self.look
-        row: dict[str, Cell] = {"t_s": look.t_s}
-        row |= _numbered("q", "_rad", look.q_rad)
-        row |= {"placement": self.placement, "first_psd": self.first}
-        row |= _spot("psd1", look.psd1) | _spot("psd2", look.psd2)
-        row |= _numbered("cmd", "_rad", look.cmd_rad)
-        if look.encoder_rad is not None:
-            row |= _numbered("enc", "_rad", look.encoder_rad)
-        row |= {f"approach{i + 1}": int(sign) for i, sign in enumerate(self.approach)}
-        row |= {"repeat": self.repeat}
-        row |= _numbered("qd", "_rad_s", look.qd_rad_s)
-        row |= {"settled": int(look.settled), "centred": int(self.centred)}
-        return row | {f"temp_{where}_degC": value for where, value in look.temperatures_degC.items()}
+        """Column name -> value, as `row_of`, plus the sigmas of the means."""
+        read: dict[str, Cell] = {"placement": self.placement, "first_psd": self.first}
+        read |= _spot("psd1", self.look.psd1) | _spot("psd2", self.look.psd2)
+        return row_of(self.look, self.approach, self.repeat, read, {"centred": int(self.centred)})
+
+
+def row_of(
+    look: ArmReading,
+    approach: NDArray[np.int64],
+    repeat: int | None,
+    read: Mapping[str, Cell],
+    done: Mapping[str, Cell] = NO_CELLS,
+) -> dict[str, Cell]:
+    """Column name -> value; names of the session-folder format, version 1. `read`: what the instrument has read;
+    `done`: how the pose was taken, beside what every session knows of it.
+    """
+    row: dict[str, Cell] = {"t_s": look.t_s, **_numbered("q", "_rad", look.q_rad), **read}
+    row |= _numbered("cmd", "_rad", look.cmd_rad)
+    if look.encoder_rad is not None:
+        row |= _numbered("enc", "_rad", look.encoder_rad)
+    row |= {f"approach{i + 1}": int(sign) for i, sign in enumerate(approach)}
+    row |= {"repeat": repeat, **_numbered("qd", "_rad_s", look.qd_rad_s), "settled": int(look.settled), **done}
+    return row | {f"temp_{where}_degC": value for where, value in look.temperatures_degC.items()}
 
 
 def sample_of(row: Mapping[str, Cell], n_joints: int) -> Sample:
@@ -113,12 +125,19 @@ class Learner(Protocol):
         ...
 
 
-class Journal(Protocol):
-    """The recording, or a test's list."""
-
-    def sample(self, sample: Sample) -> None: ...
+class Events(Protocol):
+    """Where what happens is noted."""
 
     def event(self, kind: str, detail: Mapping[str, Any]) -> None: ...
+
+
+Kept = TypeVar("Kept", contravariant=True)
+
+
+class Journal(Events, Protocol[Kept]):
+    """The recording, or a test's list."""
+
+    def sample(self, sample: Kept) -> None: ...
 
 
 def key_detail(key: PoseKey, look: Look) -> dict[str, Any]:

@@ -1,20 +1,26 @@
-"""A session step by step: between two steps it may be paused; a step that was broken off is done again.
+"""The loop of every driven session, step by step: between two steps it may be paused; a step broken off is done again.
 
-After a pause the arm may stand elsewhere, for a motion was broken off or a person has moved it. It goes back to where
-the last step ended, slowly as every motion, and from there on. The bench that a person can interrupt keeps what was
-broken off by a pause apart from what has failed.
+What a step does at its instrument, and what follows from a pause, is the session's own: before two detectors
+(`session`) and with a tracker (`tracked`). The bench that a person can interrupt keeps what was broken off by a pause
+apart from what has failed.
 """
 
-from collections.abc import Callable
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.bench import Bench, Look
-from acquisition.centring.navigator import GLANCE_S, Navigator
-from acquisition.session.control import Result, RunControl
+from acquisition.session.control import EndedEarlyError, RunControl, RunEvent
+from acquisition.session.records import Journal
 
 Floats = NDArray[np.float64]
+Steps = Iterator[Callable[[], None]]
+Taken = TypeVar("Taken")
+ELSEWHERE_RAD = 1e-3  # as acquisition/motion/gate.py: an arm further away was moved meanwhile
 
 
 class InterruptibleBench:
@@ -37,24 +43,56 @@ class InterruptibleBench:
         self._bench.stop()
 
 
-ELSEWHERE_RAD = 1e-3  # as acquisition/motion/gate.py: an arm further away was moved meanwhile
+@dataclass(frozen=True)
+class Summary(Generic[Taken]):
+    """What a session brought."""
+
+    samples: tuple[Taken, ...]
+    centring_steps: tuple[int, ...]  # motions of every run that reached its tolerance on a centred pose
+    skipped: int  # poses without a valid reading or out of reach; why is in the journal
 
 
-class Stepping:
-    """Runs steps. `astray` is called when the arm was found elsewhere: what was known of the light may be wrong."""
+class DrivenSession(ABC, Generic[Taken]):
+    """The only owner of what was taken. Stopping the arm after an error is the caller's."""
 
-    def __init__(self, control: RunControl, bench: Bench, navigator: Navigator, astray: Callable[[], None]) -> None:
-        self._control, self._bench, self._navigator, self._astray = control, bench, navigator, astray
+    def __init__(self, journal: Journal[Taken], control: RunControl) -> None:
+        self._journal, self._control = journal, control
+        self._samples: list[Taken] = []
+        self._steps: list[int] = []
+        self._skipped = 0
 
-    def step(self, act: Callable[[], Result]) -> Result:
-        """What `act` gives, once it was done without being broken off. Raises what ends a session."""
-        return self._control.step(act, self._come_back, self._astray)
+    @property
+    def taken(self) -> int:
+        """Samples so far, also after the session was cut short."""
+        return len(self._samples)
 
+    def _run(self, steps: Steps) -> Summary[Taken]:
+        """Each step until it was done without being broken off. Raises what ends a session.
+
+        The next step is asked for when the one before is done. A person may end it sooner: that is no failure, and
+        the arm stays where it is.
+        """
+        self._control.tell(RunEvent.START)
+        try:
+            for act in steps:
+                self._control.step(act, self._come_back, self._astray)
+        except EndedEarlyError:
+            self._journal.event("ended by a person", {"samples": self.taken})
+        self._control.finish()
+        return Summary(tuple(self._samples), tuple(self._steps), self._skipped)
+
+    @abstractmethod
     def _come_back(self) -> None:
-        back_rad = self._navigator.q_rad - self._bench.look(GLANCE_S).q_rad
-        if float(np.max(np.abs(back_rad))) <= ELSEWHERE_RAD:
-            return
-        self._astray()
-        came = np.where(np.abs(back_rad) > ELSEWHERE_RAD, np.sign(back_rad), self._navigator.approach)
-        self._navigator.move(self._navigator.q_rad)
-        self._navigator.approach = came.astype(np.int64)
+        """After a pause the arm may stand elsewhere: a motion was broken off, or a person has moved it."""
+
+    def _astray(self) -> None:
+        """A step was broken off: what was known of where the arm stands may be wrong."""
+
+    def _keep(self, sample: Taken, detail: Mapping[str, Any]) -> None:
+        self._samples.append(sample)
+        self._journal.sample(sample)
+        self._journal.event("sample", detail)
+
+    def _skip(self, where: Mapping[str, Any], why: str) -> None:
+        self._journal.event("skipped", {**where, "why": why})
+        self._skipped += 1

@@ -3,20 +3,21 @@
 Between two poses it may be paused; a pose that was broken off is taken again, from where the arm then stands.
 """
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from acquisition.bench import ReadingBench
 from acquisition.errors import AcquisitionError, RefusedMotionError
 from acquisition.recording.pose_plan import PlannedPose, PosePlan
 from acquisition.recording.samples import Cell
-from acquisition.session.control import EndedEarlyError, RunControl, RunEvent
-from acquisition.session.stepping import ELSEWHERE_RAD
+from acquisition.session.control import RunControl
+from acquisition.session.records import Journal, row_of
+from acquisition.session.stepping import ELSEWHERE_RAD, DrivenSession, Steps, Summary
 from acquisition.wires.tracker_bench import TargetLook
 
 Floats = NDArray[np.float64]
@@ -25,16 +26,6 @@ SPREAD_FROM = 4  # samples: from so many on, wrong units show in how far the rea
 GLANCE_S = 0.05  # of a reading of where the arm stands after a pause
 LEAST_SPREAD_M = 0.02  # of the nominal positions; less shows nothing about units
 SPREADS = (0.5, 2.0)  # measured over nominal: arms are drawn to 1 %, units are wrong by 25 and more
-
-
-class TargetBench(Protocol):
-    """Move, look, stop."""
-
-    def move(self, q_rad: Floats) -> None: ...
-
-    def look(self, dwell_s: float) -> TargetLook: ...
-
-    def stop(self) -> None: ...
 
 
 @dataclass(frozen=True)
@@ -46,24 +37,9 @@ class TrackedSample:
     repeat: int | None
 
     def row(self) -> dict[str, Cell]:
-        """Column name -> value; names of the session-folder format, version 1."""
-        look = self.look
-        x_m, y_m, z_m = look.position_m.tolist()
-        row: dict[str, Cell] = {"t_s": look.t_s, **_numbered("q", "_rad", look.q_rad)}
-        row |= {"x_m": x_m, "y_m": y_m, "z_m": z_m, **_numbered("cmd", "_rad", look.cmd_rad)}
-        if look.encoder_rad is not None:
-            row |= _numbered("enc", "_rad", look.encoder_rad)
-        row |= {f"approach{i + 1}": int(sign) for i, sign in enumerate(self.approach)}
-        row |= {"repeat": self.repeat, **_numbered("qd", "_rad_s", look.qd_rad_s), "settled": int(look.settled)}
-        return row | {f"temp_{where}_degC": value for where, value in look.temperatures_degC.items()}
-
-
-class TrackedJournal(Protocol):
-    """The recording, or a test's list."""
-
-    def sample(self, sample: TrackedSample) -> None: ...
-
-    def event(self, kind: str, detail: Mapping[str, Any]) -> None: ...
+        """Column name -> value."""
+        read = dict[str, Cell](zip(("x_m", "y_m", "z_m"), self.look.position_m.tolist(), strict=True))
+        return row_of(self.look, self.approach, self.repeat, read)
 
 
 @dataclass(frozen=True)
@@ -72,14 +48,6 @@ class TrackedOptions:
 
     dwell_s: float = 0.5
     opposite_rad: float = 0.035  # from how far a joint comes that has a side to come from
-
-
-@dataclass(frozen=True)
-class TrackedSummary:
-    """What a session brought."""
-
-    samples: tuple[TrackedSample, ...]
-    skipped: int  # poses out of reach, or without a valid reading; why is in the journal
 
 
 def check_tracked_plan(plan: PosePlan) -> None:
@@ -92,8 +60,8 @@ def check_tracked_plan(plan: PosePlan) -> None:
             )
 
 
-class TrackedSession:
-    """Runs a plan; the only owner of what was taken. Stopping the arm after an error is the caller's.
+class TrackedSession(DrivenSession[TrackedSample]):
+    """Takes the poses of a plan.
 
     `nominal_m`: positions (pose, 3) of the target by the nominal arm, at joint readings (pose, joint), in the base.
     `control`: how a person pauses and ends it; None: nobody does. `done`: poses of the plan, from 1, that were taken
@@ -102,8 +70,8 @@ class TrackedSession:
 
     def __init__(
         self,
-        bench: TargetBench,
-        journal: TrackedJournal,
+        bench: ReadingBench[TargetLook],
+        journal: Journal[TrackedSample],
         options: TrackedOptions,
         home_rad: Floats,
         nominal_m: Callable[[Floats], Floats],
@@ -112,44 +80,27 @@ class TrackedSession:
         control: RunControl | None = None,
         done: Collection[int] = (),
     ) -> None:
-        self._bench, self._journal, self._options, self._tell = bench, journal, options, tell
-        self._home_rad, self._nominal_m = home_rad, nominal_m
+        super().__init__(journal, control or RunControl(bench.stop))
+        self._bench, self._options, self._tell = bench, options, tell
+        self._home_rad, self._nominal_m, self._done = home_rad, nominal_m, frozenset(done)
         self._at_rad: Floats | None = None
         self._approach = np.zeros(len(home_rad), dtype=np.int64)
-        self._control, self._done = control or RunControl(bench.stop), frozenset(done)
-        self._samples: list[TrackedSample] = []
-        self._skipped = 0
 
-    @property
-    def taken(self) -> int:
-        """Samples so far, also after the session was cut short."""
-        return len(self._samples)
-
-    def run(self, plan: PosePlan) -> TrackedSummary:
-        """Home, every pose that is left, home. DeviceError, AcquisitionError, RecordingError end it.
-
-        A person may end it sooner: that is no failure, and the arm stays where it is.
-        """
+    def run(self, plan: PosePlan) -> Summary[TrackedSample]:
+        """Home, every pose that is left, home. DeviceError, AcquisitionError, RecordingError end it."""
         check_tracked_plan(plan)
-        self._control.tell(RunEvent.START)
-        try:
-            self._step(lambda: self._move(self._home_rad))
-            for number, pose in enumerate((pose for block in plan.block for pose in block.pose), start=1):
-                if number not in self._done:
-                    self._step(partial(self._take, number, pose))
-                    self._tell(len(self._done) + len(self._samples) + self._skipped, plan.poses)
-            self._step(lambda: self._move(self._home_rad))
-        except EndedEarlyError:
-            self._journal.event("ended by a person", {"samples": self.taken})
-        self._control.finish()
-        return TrackedSummary(tuple(self._samples), self._skipped)
+        return self._run(self._poses(plan))
 
-    def _step(self, act: Callable[[], None]) -> None:
-        """Done again where a pause broke it off. Raises what ends a session."""
-        self._control.step(act, self._look_where_it_stands, lambda: None)
+    def _poses(self, plan: PosePlan) -> Steps:
+        yield partial(self._move, self._home_rad)
+        for number, pose in enumerate((pose for block in plan.block for pose in block.pose), start=1):
+            if number not in self._done:
+                yield partial(self._take, number, pose)
+                self._tell(len(self._done) + len(self._samples) + self._skipped, plan.poses)
+        yield partial(self._move, self._home_rad)
 
-    def _look_where_it_stands(self) -> None:
-        """A motion was broken off, or a person has moved the arm: the way of each joint begins there."""
+    def _come_back(self) -> None:
+        """The way of each joint begins where the arm stands."""
         if self._at_rad is not None:
             self._control.check()
             q_rad = self._bench.look(GLANCE_S).q_rad
@@ -163,18 +114,14 @@ class TrackedSession:
                     self._move(q_rad - self._options.opposite_rad * way)
             self._move(q_rad)
         except RefusedMotionError as why:
-            return self._skip(number, str(why))
+            return self._skip({"pose": number}, str(why))
         self._control.check()
         look = self._bench.look(self._options.dwell_s)
         self._control.check()
         if not np.isfinite(look.position_m).all():
-            return self._skip(
-                number, "the instrument gave no valid position: the target is hidden, or turned away from it"
-            )
-        sample = TrackedSample(look, self._approach.copy(), pose.repeat)
-        self._samples.append(sample)
-        self._journal.sample(sample)
-        self._journal.event("sample", {"pose": number})
+            why = "the instrument gave no valid position: the target is hidden, or turned away from it"
+            return self._skip({"pose": number}, why)
+        self._keep(TrackedSample(look, self._approach.copy(), pose.repeat), {"pose": number})
         if len(self._samples) == SPREAD_FROM:
             self._check_spread()
         return None
@@ -198,11 +145,3 @@ class TrackedSession:
                 f"the readings spread over {seen:.3g} m, the target moved over {drawn:.3g} m: check length_unit and "
                 "the columns of [devices.tracker], and whether the instrument follows the target of this arm"
             )
-
-    def _skip(self, number: int, why: str) -> None:
-        self._journal.event("skipped", {"pose": number, "why": why})
-        self._skipped += 1
-
-
-def _numbered(name: str, unit: str, values: Floats) -> dict[str, Cell]:
-    return {f"{name}{i + 1}{unit}": float(value) for i, value in enumerate(values)}

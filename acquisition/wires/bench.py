@@ -5,12 +5,12 @@ box's own sample times, so that the rule is the same whether the world runs in r
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.bench import Look
+from acquisition.bench import ArmReading, Look
 from acquisition.motion.gated_arm import GatedArm
 from acquisition.wires.psd_view import PsdView, PsdWindow, psd_window
 from acquisition.wires.streams import Pump, Supervisor
@@ -108,17 +108,60 @@ class Speeds:
 class Pumps:
     """The running readers; encoders are optional."""
 
-    psd: Pump
+    instrument: Pump
     robot: Pump
     encoders: Pump | None = None
 
 
-class ArmStops:
-    """What a bench can do with the arm beside moving it, for a session that may be paused."""
+@dataclass
+class ArmOnWires:
+    """What every bench on wires does, whatever its instrument: move the arm, stop it, read it."""
 
     arm: GatedArm
+    pumps: Pumps
     speeds: Speeds
-    hurry: float  # device seconds in one second of this program's clock
+    supervisor: Supervisor
+    clock: Clock
+    hurry: float = 1.0  # device seconds in one second of this program's clock
+    beside: Mapping[str, Pump] = field(default_factory=dict[str, Pump])  # further instruments, by name
+    _cmd_rad: Floats = field(default_factory=lambda: np.empty(0), init=False)
+    _start_s: float | None = field(default=None, init=False)
+
+    def move(self, q_rad: Floats) -> None:
+        """Go there and stand still. RefusedMotionError before anything moves; DeviceError."""
+        self.supervisor.check()
+        try:
+            self.arm.move_joints(q_rad, self.speeds.speed_rad_s, self.speeds.acceleration_rad_s2)
+        except DeviceError:
+            self.supervisor.check()  # the arm was stopped because another device failed: that is the news
+            raise
+        self._cmd_rad = q_rad.copy()
+        self.supervisor.check()
+
+    def _reading(
+        self, host_s: Floats, now_s: float, temperatures_degC: Mapping[str, float], start_s: float, *, settled: bool
+    ) -> ArmReading:
+        """The arm, and further instruments, while the window (sample,) of the instrument was read. `now_s`: by the
+        instrument's clock; `start_s`: that of the session, if this is its first reading; `temperatures_degC`: by the
+        instrument.
+        """
+        self._start_s = start_s if self._start_s is None else self._start_s
+        begin_s = float(host_s[0])
+        robot = since(self.pumps.robot, begin_s)
+        joint_degC = robot["joint_temperature_degC"][-1] if "joint_temperature_degC" in robot else ()
+        temperatures = {f"joint{i + 1}": float(t) for i, t in enumerate(joint_degC)}
+        q_rad = robot["actual_q_rad"]
+        qd_rad_s = robot.get("actual_qd_rad_s", np.full_like(q_rad, np.nan))  # not every register map has speeds
+        return ArmReading(
+            host_s=float(host_s[-1]),
+            t_s=now_s - self._start_s,
+            q_rad=q_rad.mean(axis=0),
+            qd_rad_s=qd_rad_s.mean(axis=0),
+            cmd_rad=self._cmd_rad.copy(),
+            encoder_rad=encoders_since(self.pumps.encoders, begin_s),
+            temperatures_degC={**temperatures_degC, **temperatures, **temperatures_beside(self.beside)},
+            settled=settled,
+        )
 
     def stop(self) -> None:
         self.arm.stop()
@@ -145,32 +188,13 @@ class ArmStops:
         self.arm.hold()
 
 
-@dataclass
-class WiredBench(ArmStops):
+@dataclass(kw_only=True)
+class WiredBench(ArmOnWires):
     """Implements acquisition.bench.Bench. `place` asks a person, or the emulated world, to move the fixture."""
 
-    arm: GatedArm
-    pumps: Pumps
     view: PsdView
-    speeds: Speeds
-    supervisor: Supervisor
-    clock: Clock
     place: Callable[[int], None]
-    hurry: float = 1.0  # device seconds in one second of this program's clock
     rule: SettleRule = field(default_factory=SettleRule)
-    beside: Mapping[str, Pump] = field(default_factory=dict[str, Pump])  # further instruments, by name
-    _cmd_rad: Floats = field(default_factory=lambda: np.empty(0), init=False)
-    _start_s: float | None = field(default=None, init=False)
-
-    def move(self, q_rad: Floats) -> None:
-        self.supervisor.check()
-        self._cmd_rad = q_rad.copy()
-        try:
-            self.arm.move_joints(q_rad, self.speeds.speed_rad_s, self.speeds.acceleration_rad_s2)
-        except DeviceError:
-            self.supervisor.check()  # the arm was stopped because another device failed: that is the news
-            raise
-        self.supervisor.check()
 
     def place_fixture(self, placement: int) -> None:
         self.place(placement)
@@ -178,10 +202,10 @@ class WiredBench(ArmStops):
     def look(self, dwell_s: float) -> Look:
         self.supervisor.check()
         seen_s = self.clock.now_s()
-        begin_s = device_time(self.pumps.psd, seen_s, self.hurry)
+        begin_s = device_time(self.pumps.instrument, seen_s, self.hurry)
         blocks: list[Block] = []
         while True:
-            arrived = self.pumps.psd.wait(seen_s, SILENCE_S)
+            arrived = self.pumps.instrument.wait(seen_s, SILENCE_S)
             self.supervisor.check()
             seen_s = float(arrived[-1].host_s[-1])
             blocks += [block for block in arrived if block.device_s[-1] >= begin_s]
@@ -190,32 +214,15 @@ class WiredBench(ArmStops):
             window = psd_window(blocks).between(begin_s, np.inf)
             stretch = stretch_to_average(window.device_s, self.view.each(window), dwell_s, self.rule)
             if stretch is not None:
-                look = self._summed(window.between(stretch.from_s, stretch.to_s), settled=stretch.settled)
-                return replace(look, settle_s=stretch.from_s - begin_s if stretch.settled else None)
+                settle_s = stretch.from_s - begin_s if stretch.settled else None
+                return self._summed(window.between(stretch.from_s, stretch.to_s), settle_s)
 
-    def _summed(self, window: PsdWindow, *, settled: bool) -> Look:
-        if self._start_s is None:
-            self._start_s = float(window.device_s[0])
+    def _summed(self, window: PsdWindow, settle_s: float | None) -> Look:
         psd1, psd2 = self.view.mean(window)
-        begin_s = float(window.host_s[0])
-        robot = since(self.pumps.robot, begin_s)
-        joint_degC = robot["joint_temperature_degC"][-1] if "joint_temperature_degC" in robot else ()
-        temperatures = {f"joint{i + 1}": float(t) for i, t in enumerate(joint_degC)}
-        q_rad = robot["actual_q_rad"]
-        qd_rad_s = robot.get("actual_qd_rad_s", np.full_like(q_rad, np.nan))  # not every register map has speeds
-        return Look(
-            host_s=float(window.host_s[-1]),
-            t_s=float(window.device_s.mean()) - self._start_s,
-            q_rad=q_rad.mean(axis=0),
-            qd_rad_s=qd_rad_s.mean(axis=0),
-            cmd_rad=self._cmd_rad.copy(),
-            encoder_rad=encoders_since(self.pumps.encoders, begin_s),
-            psd1=psd1,
-            psd2=psd2,
-            temperatures_degC={**window.mean_temperature(), **temperatures, **temperatures_beside(self.beside)},
-            settled=settled,
-            window_s=(float(window.device_s[0]), float(window.device_s[-1])),
-        )
+        from_s, to_s = float(window.device_s[0]), float(window.device_s[-1])
+        now_s, degC = float(window.device_s.mean()), window.mean_temperature()
+        reading = self._reading(window.host_s, now_s, degC, from_s, settled=settle_s is not None)
+        return Look(**vars(reading), psd1=psd1, psd2=psd2, window_s=(from_s, to_s), settle_s=settle_s)
 
 
 def device_time(pump: Pump, host_s: float, hurry: float) -> float:

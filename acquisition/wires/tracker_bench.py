@@ -4,28 +4,22 @@ Settling is judged as before two detectors (`bench`): neighbouring short windows
 instrument without a clock of its own is taken to keep the rate that its rig file states.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.motion.gated_arm import GatedArm
+from acquisition.bench import ArmReading
 from acquisition.wires.bench import (
     SILENCE_S,
-    ArmStops,
+    ArmOnWires,
     SettleRule,
-    Speeds,
     device_time,
-    encoders_since,
-    since,
     stretch_to_average,
-    temperatures_beside,
 )
-from acquisition.wires.streams import Pump, Supervisor
-from drivers.clock import Clock
 from drivers.device import Block
-from drivers.errors import DeviceError, DeviceStale
+from drivers.errors import DeviceStale
 
 Floats = NDArray[np.float64]
 CLOCK_S = 5.0  # host time within which a reading of after the motion comes; emulators fall behind by less
@@ -35,57 +29,20 @@ GOOD_SHARE = 0.5  # of the samples of a dwell that have to be good
 
 
 @dataclass(frozen=True)
-class TargetLook:
-    """One settled reading. A position that was not seen in half of the samples, or more, is NaN."""
+class TargetLook(ArmReading):
+    """A reading of the target. A position that was not seen in half of the samples, or more, is NaN."""
 
-    host_s: float
-    t_s: float  # since the first reading of the session, by the instrument's clock
-    q_rad: Floats  # (joint,) as the controller reports
-    qd_rad_s: Floats
-    cmd_rad: Floats
-    encoder_rad: Floats | None
     position_m: Floats  # (3,) in the instrument's frame
     sigma_m: Floats  # (3,) of the mean, from the scatter of the samples
     samples: int  # good ones
-    temperatures_degC: dict[str, float]
-    settled: bool
 
 
-@dataclass(frozen=True)
-class TrackerPumps:
-    """The running readers; encoders are optional."""
+@dataclass(kw_only=True)
+class TrackerBench(ArmOnWires):
+    """`rate_hz`: of the instrument, as stated."""
 
-    tracker: Pump
-    robot: Pump
-    encoders: Pump | None = None
-
-
-@dataclass
-class TrackerBench(ArmStops):
-    """`rate_hz`: of the instrument, as stated. `hurry`: device seconds in one second of this program's clock."""
-
-    arm: GatedArm
-    pumps: TrackerPumps
-    speeds: Speeds
-    supervisor: Supervisor
-    clock: Clock
     rate_hz: float
-    hurry: float = 1.0
     rule: SettleRule = field(default_factory=lambda: SettleRule(limit_s=3.0))
-    beside: Mapping[str, Pump] = field(default_factory=dict[str, Pump])  # further instruments, by name
-    _cmd_rad: Floats = field(default_factory=lambda: np.empty(0), init=False)
-    _start_s: float | None = field(default=None, init=False)
-
-    def move(self, q_rad: Floats) -> None:
-        """Go there and stand still. RefusedMotionError before anything moves; DeviceError."""
-        self.supervisor.check()
-        try:
-            self.arm.move_joints(q_rad, self.speeds.speed_rad_s, self.speeds.acceleration_rad_s2)
-        except DeviceError:
-            self.supervisor.check()  # the arm was stopped because another device failed: that is the news
-            raise
-        self._cmd_rad = q_rad.copy()
-        self.supervisor.check()
 
     def look(self, dwell_s: float) -> TargetLook:
         """Wait until the position has settled, then average `dwell_s` of the instrument's time. DeviceError."""
@@ -95,7 +52,7 @@ class TrackerBench(ArmStops):
         blocks: list[Block] = []
         from_s = -np.inf
         while True:
-            arrived = self.pumps.tracker.wait(seen_s, SILENCE_S)
+            arrived = self.pumps.instrument.wait(seen_s, SILENCE_S)
             self.supervisor.check()
             seen_s = float(arrived[-1].host_s[-1])
             blocks += arrived
@@ -121,37 +78,22 @@ class TrackerBench(ArmStops):
 
     def _begin_s(self, host_s: float) -> float | None:
         """By the instrument's clock; None: it has none."""
-        newest = self.pumps.tracker.latest() or self.pumps.tracker.wait(-np.inf, SILENCE_S)[-1]
-        return device_time(self.pumps.tracker, host_s, self.hurry) if np.isfinite(newest.device_s[-1]) else None
+        newest = self.pumps.instrument.latest() or self.pumps.instrument.wait(-np.inf, SILENCE_S)[-1]
+        return device_time(self.pumps.instrument, host_s, self.hurry) if np.isfinite(newest.device_s[-1]) else None
 
     def _averaged(self, window: "TargetWindow", *, settled: bool) -> TargetLook:
         clocked = bool(np.isfinite(window.device_s).all())
         now_s = float(window.device_s.mean() if clocked else self.hurry * window.host_s.mean())
-        self._start_s = now_s if self._start_s is None else self._start_s
         good_m = window.position_m[np.isfinite(window.position_m).all(axis=1)]
         enough = len(good_m) > max(1.0, GOOD_SHARE * len(window.position_m))
         nowhere = np.full(3, np.nan)
-        begin_s = float(window.host_s[0])
-        robot = since(self.pumps.robot, begin_s)
-        q_rad = robot["actual_q_rad"]
-        joint_degC = robot["joint_temperature_degC"][-1] if "joint_temperature_degC" in robot else ()
         air = {"air": float(np.mean(window.temperature_degC))} if len(window.temperature_degC) else {}
+        reading = self._reading(window.host_s, now_s, air, now_s, settled=settled)
         return TargetLook(
-            host_s=float(window.host_s[-1]),
-            t_s=now_s - self._start_s,
-            q_rad=q_rad.mean(axis=0),
-            qd_rad_s=robot.get("actual_qd_rad_s", np.full_like(q_rad, np.nan)).mean(axis=0),
-            cmd_rad=self._cmd_rad.copy(),
-            encoder_rad=encoders_since(self.pumps.encoders, begin_s),
+            **vars(reading),
             position_m=good_m.mean(axis=0) if enough else nowhere,
             sigma_m=good_m.std(axis=0, ddof=1) / np.sqrt(len(good_m)) if enough else nowhere,
             samples=len(good_m),
-            temperatures_degC={
-                **air,
-                **{f"joint{i + 1}": float(t) for i, t in enumerate(joint_degC)},
-                **temperatures_beside(self.beside),
-            },
-            settled=settled,
         )
 
 

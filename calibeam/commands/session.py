@@ -14,7 +14,7 @@ from acquisition.errors import AcquisitionError
 from acquisition.guided.plan import GuidedOptions, planned_visits
 from acquisition.recording import RecordingError
 from acquisition.recording.mcap import parts
-from acquisition.recording.pose_plan import read_pose_plan
+from acquisition.recording.pose_plan import PosePlan, read_pose_plan
 from acquisition.recording.rig import Rig, load_rig, rig_text
 from acquisition.session.plan import PlanOptions
 from calibeam.asking import at_terminal
@@ -25,7 +25,7 @@ from calibeam.guided.recorded import encoder_address, is_guided
 from calibeam.guided.run import plan_of, run_guided
 from calibeam.live.feed import SILENT, Feed
 from calibeam.sessions.job import EarlierParts, Job, new_place, read_earlier_parts, with_place, with_places
-from calibeam.sessions.run import run_session
+from calibeam.sessions.with_detectors import WithDetectors
 from calibeam.site_log import logged
 from drivers.clock import SystemClock
 
@@ -182,6 +182,12 @@ class Wanted:
     seed: int
     emulators: EmulatorOptions
 
+    def poses(self) -> tuple[PosePlan | None, str]:
+        """Of the plan, and its text."""
+        if self.plan is None:
+            return None, ""
+        return read_pose_plan(self.plan, self.rig), self.plan.read_text(encoding="utf-8")
+
 
 @logged
 def session(
@@ -253,9 +259,8 @@ def session(
 def _session_of_robot(wanted: Wanted, robot: RobotOptions, page: PageOptions, console: Console) -> None:
     """The session of an arm that a controller moves."""
     check_session(wanted.rig)
-    poses = None if wanted.plan is None else read_pose_plan(wanted.plan, wanted.rig)
-    asking, addresses = at_terminal(), addresses_of(wanted.rig, hurry=wanted.emulators.time_scale)
-    pose_text = "" if wanted.plan is None else wanted.plan.read_text(encoding="utf-8")
+    (poses, pose_text), asking = wanted.poses(), at_terminal()
+    addresses = addresses_of(wanted.rig, hurry=wanted.emulators.time_scale)
     control = wanted.emulators.address()
     job = Job(
         wanted.rig,
@@ -269,35 +274,33 @@ def _session_of_robot(wanted: Wanted, robot: RobotOptions, page: PageOptions, co
         None if control is None else _through(*control),
     )
     earlier = _earlier(job, go_on=robot.continue_, place=robot.place)
-    agrees = robot.yes or (control is not None and asking is None and moves_nothing_real(job.addresses.robot))
+    agrees = robot.yes or (control is not None and asking is None and moves_nothing_real(addresses.robot))
     with _page(wanted.rig, page, console) as feed:
-        run_session(job, console, earlier, feed, asking=asking, agrees=agrees, stands=robot.stands)
+        WithDetectors(job, console, earlier, feed, asking=asking, agrees=agrees, stands=robot.stands).run()
 
 
 def _session_with_tracker(wanted: Wanted, tracker: TrackerOptions, page: PageOptions, robot: RobotOptions) -> None:
     """The session of a driven arm whose target a tracker measures."""
-    from calibeam.sessions.with_tracker import TrackedJob, run_tracked
+    from calibeam.sessions.with_tracker import TrackedJob, WithTracker
 
     rig, console, control = wanted.rig, Console(), wanted.emulators.address()
     check_tracked_session(rig)
     addresses, asking = tracker_addresses_of(rig, hurry=wanted.emulators.time_scale), at_terminal()
     if not robot.continue_:
         _refuse_begun(wanted.out)
-    plan = read_pose_plan(wanted.plan, rig) if wanted.plan is not None else None
-    plan_text = "" if wanted.plan is None else wanted.plan.read_text(encoding="utf-8")
+    plan, plan_text = wanted.poses()
     agreed = robot.yes or (control is not None and asking is None and moves_nothing_real(addresses.robot))
     job = TrackedJob(
         rig, wanted.text, wanted.out, addresses, plan, tracker.poses, wanted.seed, plan_text, robot.continue_
     )
     with _page(rig, page, console) as feed:
-        run_tracked(job, console, feed, asking=asking, agrees=agreed)
+        WithTracker(job, console, feed, asking=asking, agrees=agreed).run()
 
 
 def _session_by_hand(wanted: Wanted, hand: HandOptions, console: Console) -> None:
     """The session of a measuring arm: a person moves the probe, or an emulated hand."""
-    rig, plan, verify = wanted.rig, wanted.plan, hand.verify
+    rig, verify, (poses, _) = wanted.rig, hand.verify, wanted.poses()
     options = GuidedOptions(hand.postures, hand.lengths, wanted.seed)
-    poses = None if plan is None else read_pose_plan(plan, rig)
     visits = plan_of(rig, options, verify=verify) if poses is None else planned_visits(poses, rig)
     encoders = encoder_address(rig, hurry=wanted.emulators.time_scale)
     control = wanted.emulators.address()

@@ -22,9 +22,9 @@ from acquisition.recording import Event, RecordingError, RecordingWriter, read
 from acquisition.recording.pose_plan import PosePlan
 from acquisition.recording.rig import Rig
 from acquisition.session.plan import PlanOptions
-from acquisition.session.planned import PlannedSession
 from acquisition.session.records import Progress, Sample
-from acquisition.session.session import Session, Summary
+from acquisition.session.session import Session
+from acquisition.session.stepping import Summary
 from acquisition.session.tracked import TrackedSample
 from calibeam.emulation import EmulationError
 from calibeam.interrupts import ENDING, heard_by
@@ -36,7 +36,7 @@ from drivers.errors import DeviceError
 
 
 class RecordingJournal:
-    """Implements acquisition.session.records.Journal, and that of acquisition.session.tracked."""
+    """Implements acquisition.session.records.Journal, of every driven session."""
 
     def __init__(self, writer: RecordingWriter, clock: Clock) -> None:
         self._writer, self._clock = writer, clock
@@ -88,12 +88,12 @@ def record_session(
     bar: Bar,
     plan: PosePlan | None = None,
     sight: Sight | None = None,
-) -> Summary:
+) -> Summary[Sample]:
     """Take every place of the rig, or the poses of a plan, with progress on `bar`; with a camera the light is aimed at
     by it.
 
     PartialResult when it ended early: the arm stands, samples are kept. Nobody is asked, and nothing can be paused:
-    calibeam/sessions/run.py.
+    calibeam/sessions/with_detectors.py.
     """
     home_rad = np.array(rig.motion.home_rad)  # there is one: check_session
     with bar:
@@ -103,20 +103,16 @@ def record_session(
             text = f"station {now.placement}, PSD {now.first} first: {now.phase.value}"
             bar.update(task, completed=now.done, total=now.total, description=text)
 
-        learner, journal = FittedLearner(rig), RecordingJournal(writer, clock)
-        if plan is None:
-            limits = Limits(step_rad=rig.motion.step_limit_rad)
-            session = Session(bench, learner, journal, options, home_rad, limits=limits, tell=tell, sight=sight)
-            summary = kept(bench, writer, clock, session, partial(session.run, tuple(rig.placements)))
-        else:
-            planned = PlannedSession(bench, learner, journal, options, home_rad, tell=tell, sight=sight)
-            summary = kept(bench, writer, clock, planned, partial(planned.run, plan))
+        limits, journal = Limits(step_rad=rig.motion.step_limit_rad), RecordingJournal(writer, clock)
+        session = Session(bench, FittedLearner(rig), journal, options, home_rad, limits=limits, tell=tell, sight=sight)
+        run = partial(session.run, tuple(rig.placements)) if plan is None else partial(session.take_planned, plan)
+        summary = kept(bench, writer, clock, session, run)
         bar.update(task, completed=len(summary.samples))
     end_event(writer, clock, summary)
     return summary
 
 
-def end_event(writer: RecordingWriter, clock: Clock, summary: Summary) -> None:
+def end_event(writer: RecordingWriter, clock: Clock, summary: Summary[Any]) -> None:
     """The session came to its end."""
     writer.event(Event(clock.now_s(), "end", {"samples": len(summary.samples), "skipped": summary.skipped}))
 

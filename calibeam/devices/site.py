@@ -1,13 +1,14 @@
 """Connects the devices of a rig, whether real or emulated, and runs their readers into the recording."""
 
 import itertools
-from collections.abc import Callable, Generator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager, suppress
+from collections.abc import Callable, Generator, Mapping
+from contextlib import AbstractContextManager, ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from functools import partial
 from typing import Any, Generic, TypeVar
 
 from acquisition.errors import StoppedError
+from acquisition.motion.gated_arm import GatedArm
 from acquisition.recording import Channel, Event, RecordingError, RecordingWriter, RigFileError
 from acquisition.recording.rig import Rig
 from acquisition.recording.rig.devices import EncodersDevice, OtherDevice, PsdDevice, RobotDevice, TrackerDevice
@@ -16,12 +17,12 @@ from acquisition.wires.attaching import Guarded
 from acquisition.wires.bench import SILENCE_S, Pumps, Speeds, WiredBench
 from acquisition.wires.psd_view import PsdView, psd_window
 from acquisition.wires.streams import STALE_S, Pump, Supervisor
-from acquisition.wires.tracker_bench import TrackerBench, TrackerPumps
+from acquisition.wires.tracker_bench import TrackerBench
 from calibeam.devices.encoders import emulated_encoders, encoder_driver
-from calibeam.devices.others import Other, emulated_others, other_drivers
+from calibeam.devices.others import emulated_others, other_drivers
 from calibeam.devices.psd import PsdInstrument, emulated_psd, psd_driver, psd_view
 from calibeam.devices.recorder import uninterrupted
-from calibeam.devices.robot import Robot, emulated_robot, robot_of
+from calibeam.devices.robot import emulated_robot, robot_of
 from calibeam.devices.tracker_of_rig import VIEWED as TRACKER_VIEWED
 from calibeam.devices.tracker_of_rig import emulated_tracker, tracker_driver
 from calibeam.live.feed import PAGE_STOP, SILENT, Feed
@@ -132,39 +133,9 @@ def connected_tracker(
     rig: Rig, addresses: TrackerAddresses, writer: RecordingWriter, clock: Clock, feed: Feed = SILENT
 ) -> Generator[TrackerBench]:
     """The bench of a tracker on wires, its readers running. At the end the arm is stopped, every port released."""
-    with ExitStack() as cleaning:
-        robot, arm, kept, beside = _begun(addresses, writer, clock, feed, cleaning)
-        tracker = tracker_driver(addresses.instrument, clock, addresses.hurry)
-        pumps = TrackerPumps(
-            tracker=cleaning.enter_context(_pumped(tracker, kept)),
-            robot=cleaning.enter_context(_pumped(robot.reader, kept)),
-            encoders=_encoders(addresses, kept, cleaning),
-        )
-        cleaning.callback(_released, arm)
-        _connect_arm(arm, kept.supervisor)
-        speeds = Speeds(rig.motion.speed_rad_s, rig.motion.acceleration_rad_s2)
-        gated, rate_hz = gated_arm(arm, rig, pumps.robot), addresses.instrument.rate_hz
-        yield TrackerBench(gated, pumps, speeds, kept.supervisor, clock, rate_hz, addresses.hurry, beside=beside)
-
-
-def _begun(
-    addresses: AddressesWith[Instrument], writer: RecordingWriter, clock: Clock, feed: Feed, cleaning: ExitStack
-) -> tuple[Robot, Movable, Kept, dict[str, Pump]]:
-    robot = robot_of(addresses.robot, clock, addresses.hurry)
-    arm = robot.arm()
-    supervisor = Supervisor(arm.hold, clock)
-    cleaning.callback(feed.stops_by, None)
-    feed.stops_by(partial(supervisor.stop, StoppedError(PAGE_STOP)))  # while connecting, too
-    kept = Kept(writer, clock, supervisor, feed)
-    return robot, arm, kept, _others(other_drivers(addresses.others, clock), kept, cleaning)
-
-
-def _connect_arm(arm: Movable, supervisor: Supervisor) -> None:
-    try:
-        arm.connect()
-    except DeviceError:
-        supervisor.check()  # another device failed meanwhile, and its stop ended this too: that is the news
-        raise
+    tracker = tracker_driver(addresses.instrument, clock, addresses.hurry)
+    with _wires(rig, addresses, writer, clock, feed, partial(_pumped, tracker)) as wires:
+        yield TrackerBench(*wires, rate_hz=addresses.instrument.rate_hz)
 
 
 @contextmanager
@@ -177,41 +148,58 @@ def connected(
     feed: Feed = SILENT,
 ) -> Generator[WiredBench]:
     """The bench on wires, its readers running. At the end the arm is stopped and every port released."""
+    psd = psd_driver(addresses.instrument, rig, clock, addresses.hurry)
+
+    @contextmanager
+    def read(kept: Kept) -> Generator[Pump]:
+        with _pumped(psd, kept, _spots_beside(psd, addresses.instrument, writer)) as pump:
+            feed.sees(psd_view(psd, addresses.instrument))
+            yield pump
+
+    with _wires(rig, addresses, writer, clock, feed, read) as wires:
+        yield WiredBench(*wires, view=psd_view(psd, addresses.instrument), place=place)
+
+
+@contextmanager
+def _wires(
+    rig: Rig,
+    addresses: Addresses | TrackerAddresses,
+    writer: RecordingWriter,
+    clock: Clock,
+    feed: Feed,
+    read: Callable[[Kept], AbstractContextManager[Pump]],
+) -> Generator[tuple[GatedArm, Pumps, Speeds, Supervisor, Clock, float, dict[str, Pump]]]:
+    """Everything beside what the instrument needs of its own, as a bench takes it. `read`: runs its reader."""
     with ExitStack() as cleaning:
-        robot, arm, kept, beside = _begun(addresses, writer, clock, feed, cleaning)
-        psd = psd_driver(addresses.instrument, rig, clock, addresses.hurry)
-        pumps = Pumps(
-            psd=cleaning.enter_context(_pumped(psd, kept, _spots_beside(psd, addresses.instrument, writer))),
-            robot=cleaning.enter_context(_pumped(robot.reader, kept)),
-            encoders=_encoders(addresses, kept, cleaning),
-        )
-        feed.sees(psd_view(psd, addresses.instrument))
+        robot = robot_of(addresses.robot, clock, addresses.hurry)
+        arm = robot.arm()
+        supervisor = Supervisor(arm.hold, clock)
+        cleaning.callback(feed.stops_by, None)
+        feed.stops_by(partial(supervisor.stop, StoppedError(PAGE_STOP)))  # while connecting, too
+        kept = Kept(writer, clock, supervisor, feed)
+        beside = {
+            one.device.name: cleaning.enter_context(_pumped(one.device, kept, silence_s=one.silence_s))
+            for one in other_drivers(addresses.others, clock)
+        }
+        instrument = cleaning.enter_context(read(kept))
+        pump, encoders = cleaning.enter_context(_pumped(robot.reader, kept)), None
+        if addresses.encoders is not None:
+            driver = encoder_driver(addresses.encoders, clock, hurry=addresses.hurry)
+            encoders = cleaning.enter_context(_pumped(driver, kept))
         cleaning.callback(_released, arm)
-        _connect_arm(arm, kept.supervisor)
+        try:
+            arm.connect()
+        except DeviceError:
+            supervisor.check()  # another device failed meanwhile, and its stop ended this too: that is the news
+            raise
         speeds = Speeds(rig.motion.speed_rad_s, rig.motion.acceleration_rad_s2)
-        gated = gated_arm(arm, rig, pumps.robot)
-        view, hurry = psd_view(psd, addresses.instrument), addresses.hurry
-        yield WiredBench(gated, pumps, view, speeds, kept.supervisor, clock, place, hurry, beside=beside)
+        pumps = Pumps(instrument, pump, encoders)
+        yield gated_arm(arm, rig, pump), pumps, speeds, supervisor, clock, addresses.hurry, beside
 
 
 def _released(arm: Movable) -> None:
     with uninterrupted():
         arm.close()
-
-
-def _encoders(addresses: Addresses | TrackerAddresses, kept: Kept, cleaning: ExitStack) -> Pump | None:
-    device = addresses.encoders
-    if device is None:
-        return None
-    driver = encoder_driver(device, kept.clock, hurry=addresses.hurry)
-    return cleaning.enter_context(_pumped(driver, kept))
-
-
-def _others(others: Sequence[Other], kept: Kept, cleaning: ExitStack) -> dict[str, Pump]:
-    """Readers of the plug-ins' instruments, by name."""
-    return {
-        one.device.name: cleaning.enter_context(_pumped(one.device, kept, silence_s=one.silence_s)) for one in others
-    }
 
 
 def _spots_beside(psd: PsdInstrument, device: PsdDevice, writer: RecordingWriter) -> Callable[[Block], None]:

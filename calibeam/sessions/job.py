@@ -43,10 +43,7 @@ class EarlierParts:
 
 def read_earlier_parts(folder: Path, rig: Rig) -> EarlierParts:
     """Of all parts. RecordingError where there are none, or they are of another rig."""
-    files = parts(folder)
-    if not files:
-        raise RecordingError(f"{folder}: no session to go on with; leave --continue out, or give the folder of one")
-    each = [read(path) for path in files]
+    each = begun_in(folder)
     try:
         return _of_parts(each, folder, rig)
     except (KeyError, TypeError, ValueError) as error:  # events and samples of another program, or damaged
@@ -54,6 +51,14 @@ def read_earlier_parts(folder: Path, rig: Rig) -> EarlierParts:
             f"{folder}: its recordings do not contain which poses are done ({shown(str(error))}); "
             "begin a new session with another --out"
         ) from error
+
+
+def begun_in(folder: Path) -> list[Recording]:
+    """Every recording of the session. RecordingError where there is none."""
+    files = parts(folder)
+    if not files:
+        raise RecordingError(f"{folder}: no session to go on with; leave --continue out, or give the folder of one")
+    return [read(path) for path in files]
 
 
 def _of_parts(each: Sequence[Recording], folder: Path, rig: Rig) -> EarlierParts:

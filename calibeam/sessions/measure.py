@@ -10,12 +10,12 @@ import numpy as np
 from acquisition.centring.camera.board import Sight
 from acquisition.centring.loop import Limits
 from acquisition.recording import Event, RecordingWriter
-from acquisition.session.control import RunControl
+from acquisition.session.control import RunControl, RunState
 from acquisition.session.plan import Block
-from acquisition.session.planned import PlannedSession
 from acquisition.session.records import Sample
-from acquisition.session.session import Session, Summary
-from acquisition.wires.bench import WiredBench
+from acquisition.session.session import Session
+from acquisition.session.stepping import Summary
+from acquisition.wires.bench import ArmOnWires, WiredBench
 from calibeam.devices.camera import camera_sight
 from calibeam.devices.recorder import Earlier, RecordingJournal, end_event, kept, new_recording
 from calibeam.devices.site import connected
@@ -52,20 +52,16 @@ class Measuring:
         self._reporter, self._person = told
         self._samples: list[Sample] = []
         self._forecaster = Forecaster(self._forecast, self._no_forecast)
-        self._control = RunControl(
-            bench.stop,
+        self._control = control_of(
+            bench,
             clock,
-            lambda: bench.supervisor.failure,
+            self._reporter,
             self._reporter.state,
-            hold_arm=bench.hold,
-            undelivered=self._reporter.undelivered,
-            rests_in_s=bench.rests_in_s,
-            ease_arm=bench.ease,
-            pausing=lambda rests_in_s, eased: self._reporter.pausing(rests_in_s, bench.ease_s if eased else None),
+            lambda rests_in_s, eased: self._reporter.pausing(rests_in_s, bench.ease_s if eased else None),
         )
         self._session = self._session_of(sight)
 
-    def take(self, more: Sequence[Block] = ()) -> Summary:
+    def take(self, more: Sequence[Block] = ()) -> Summary[Sample]:
         """All that was taken in this part so far. PartialResult when it ended early: the arm stands."""
         with Keys(self._control, self._person.keyboard) as keys, self._person.at(keys), self._forecaster.running():
             try:
@@ -87,34 +83,21 @@ class Measuring:
         """Where the fixture stands."""
         return self._samples[-1].placement if self._samples else self._part.earlier.standing
 
-    def _session_of(self, sight: Sight | None) -> Session | PlannedSession:
+    def _session_of(self, sight: Sight | None) -> Session:
         rig, options, earlier = self._part.rig, self._job.options, self._part.earlier.taken
         journal = ReportingJournal(RecordingJournal(self._writer, self._clock), self._reporter, self._took)
         learner, home_rad = FittedLearner(rig), np.array(rig.motion.home_rad)
         tell, limits, control = self._reporter.progress, Limits(step_rad=rig.motion.step_limit_rad), self._control
-        if self._part.plan is not None:
-            return PlannedSession(
-                self._bench,
-                learner,
-                journal,
-                options,
-                home_rad,
-                tell=tell,
-                sight=sight,
-                control=control,
-                earlier=earlier,
-            )
         return Session(
             self._bench, learner, journal, options, home_rad,
             limits=limits, tell=tell, sight=sight, control=control, earlier=earlier,
         )  # fmt: skip
 
-    def _run(self, more: Sequence[Block]) -> Callable[[], Summary]:
+    def _run(self, more: Sequence[Block]) -> Callable[[], Summary[Sample]]:
         standing = None if self._samples else self._part.earlier.standing
-        if isinstance(self._session, Session):
-            return partial(self._session.take, more or self._part.blocks, standing)
-        assert self._part.plan is not None  # noqa: S101 - it is why the session is one of a plan
-        return partial(self._session.run, self._part.plan, standing)
+        if self._part.plan is not None:
+            return partial(self._session.take_planned, self._part.plan, standing)
+        return partial(self._session.take, more or self._part.blocks, standing)
 
     def _took(self, samples: list[Sample]) -> None:
         self._samples = samples
@@ -152,6 +135,27 @@ def measuring(
             instead_of = next((k for k, v in part.earlier.stands_in.items() if v == place.id), None)
             writer.event(Event(clock.now_s(), STANDS_IN, {"id": place.id, "instead_of": instead_of}))
         yield Measuring(job, part, ahead, bench, writer, clock, told, sight)
+
+
+def control_of(
+    bench: ArmOnWires,
+    clock: Clock,
+    reporter: StatusReporter,
+    changed: Callable[[RunState], None],
+    pausing: Callable[[float, bool], None] = lambda rests_in_s, eased: None,
+) -> RunControl:
+    """Of an arm on wires, as every session has it. `changed`, `pausing`: as of RunControl."""
+    return RunControl(
+        bench.stop,
+        clock,
+        lambda: bench.supervisor.failure,
+        changed,
+        hold_arm=bench.hold,
+        undelivered=reporter.undelivered,
+        rests_in_s=bench.rests_in_s,
+        ease_arm=bench.ease,
+        pausing=pausing,
+    )
 
 
 def _emulated(part: Part, place: Callable[[int], None], placement: int) -> None:

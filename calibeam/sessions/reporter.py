@@ -125,7 +125,9 @@ class StatusReporter:
 class ReportingJournal:
     """Implements acquisition.session.records.Journal: what a person has to know of it is reported as well."""
 
-    def __init__(self, journal: Journal, reporter: StatusReporter, took: Callable[[list[Sample]], None]) -> None:
+    def __init__(
+        self, journal: Journal[Sample], reporter: StatusReporter, took: Callable[[list[Sample]], None]
+    ) -> None:
         """`took`: all samples so far, after each."""
         self._journal, self._reporter, self._took = journal, reporter, took
         self.samples: list[Sample] = []

@@ -1,10 +1,9 @@
-"""A whole session with a tracker: devices, plan, arm, measure, results; paused and gone on with as any other.
+"""A session with a tracker on site; paused and gone on with as any other.
 
 Without a plan poses are drawn evenly over the joints' ranges, ordered by short ways, some of them repeated.
 """
 
 from collections.abc import Callable, Mapping
-from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -13,16 +12,17 @@ from numpy.typing import NDArray
 from rich.progress import Progress as Bar
 
 from acquisition.errors import AcquisitionError
-from acquisition.recording import Event, RecordingError, RecordingWriter, RigFileError, read
-from acquisition.recording.mcap import differs, next_part, parts
+from acquisition.recording import Event, RecordingError, RecordingWriter, RigFileError
+from acquisition.recording.mcap import differs, next_part
 from acquisition.recording.pose_plan import PlannedBlock, PlannedPose, PosePlan
 from acquisition.recording.rig import Rig
-from acquisition.session.control import RunControl, RunState
-from acquisition.session.tracked import TrackedOptions, TrackedSession, TrackedSummary, check_tracked_plan
+from acquisition.session.control import RunState
+from acquisition.session.stepping import Summary
+from acquisition.session.tracked import TrackedOptions, TrackedSample, TrackedSession, check_tracked_plan
 from acquisition.wires.tracker_bench import TrackerBench
 from calibeam.asking import Asking
 from calibeam.console import Console
-from calibeam.devices.recorder import Earlier, RecordingJournal, kept, new_recording
+from calibeam.devices.recorder import Earlier, RecordingJournal, end_event, kept, new_recording
 from calibeam.devices.site import TrackerAddresses, connected_tracker
 from calibeam.interrupts import INTERRUPTS
 from calibeam.live.feed import SILENT, Feed, Progress
@@ -30,13 +30,16 @@ from calibeam.motion.reachable_poses import candidates_of, way_is_clear
 from calibeam.outcome import PartialResult
 from calibeam.printing.progress import progress_bar
 from calibeam.rig_files import of_one_point
-from calibeam.sessions.job import GO_ON, PLAN_NOTE, SEED_NOTE, plan_sha256
+from calibeam.sessions.job import GO_ON, PLAN_NOTE, SEED_NOTE, begun_in, plan_sha256
 from calibeam.sessions.keys import Keys
-from calibeam.sessions.person import Person, devices_ready
+from calibeam.sessions.measure import control_of
+from calibeam.sessions.person import Person
 from calibeam.sessions.reporter import StatusReporter
+from calibeam.sessions.run import OnSite
 from calibeam.sessions.views import PageLines, PlainView
-from calibeam.site_log import SESSION_LOG, SITE_LOG
-from calibrate.model.arms.rig_arm import RigArm
+from calibrate.model.arms.rig_arm import (
+    RigArm,
+)
 from drivers.clock import Clock, SystemClock
 
 Floats = NDArray[np.float64]
@@ -81,9 +84,7 @@ def taken_before(job: TrackedJob) -> TakenBefore:
     notes = {SEED_NOTE: str(job.seed), POSES_NOTE: str(job.poses)}
     if job.plan is not None:
         notes = {PLAN_NOTE: plan_sha256(job.plan_text)}
-    each = [read(path) for path in parts(job.out)] if job.go_on else []
-    if job.go_on and not each:
-        raise RecordingError(f"{job.out}: no session to go on with; leave --continue out, or give the folder of one")
+    each = begun_in(job.out) if job.go_on else []
     if each:
         if said := differs(each[-1].rig, job.rig):
             raise RecordingError(f"{job.out}: its session was of another rig: {said}; begin one with another --out")
@@ -100,68 +101,61 @@ def taken_before(job: TrackedJob) -> TakenBefore:
     return TakenBefore(plan, notes, done, samples)
 
 
-def run_tracked(job: TrackedJob, console: Console, feed: Feed = SILENT, *, asking: Asking | None, agrees: bool) -> None:
-    """The whole session; recording, model, diagnosis and report in `job.out`. PartialResult when it ended early.
+class WithTracker(OnSite):
+    """Recording, model, diagnosis and report in `job.out`.
 
     `asking`: the terminal at which a person sits; `agrees`: who needs not be asked whether the arm may move.
     """
-    if job.plan is not None:
-        check_tracked_plan(job.plan)
-    clock, broken = SystemClock(), False
-    job.out.mkdir(parents=True, exist_ok=True)
-    SITE_LOG.begin(job.out / SESSION_LOG)
-    reporter = StatusReporter(job.rig, clock, (PlainView(console), PageLines(feed)))
-    person = Person(console, reporter, asking, agrees=agrees)
-    while True:
-        with person.keeping(job.out) if broken else nullcontext():
-            devices_ready(job.rig, job.addresses.hurry, clock, person)
-            before = taken_before(replace(job, go_on=job.go_on or broken))
-            if not before.left:
-                reporter.report("everything that was planned is taken")
-                break
-            taken = f", {before.samples} taken before" if before.samples else ""
-            reporter.report(f"session with a tracker, readings: {before.left}, repeats among them{taken}")
-            if left_open := of_one_point(job.rig):
-                reporter.report(left_open)
-            person.arm()
+
+    def __init__(
+        self, job: TrackedJob, console: Console, feed: Feed = SILENT, *, asking: Asking | None, agrees: bool
+    ) -> None:
+        if job.plan is not None:
+            check_tracked_plan(job.plan)
+        clock = SystemClock()
+        reporter = StatusReporter(job.rig, clock, (PlainView(console), PageLines(feed)))
+        person = Person(console, reporter, asking, agrees=agrees)
+        super().__init__(job.rig, job.out, job.addresses.hurry, console, clock, person)
+        self._job, self._feed = job, feed
+
+    def _catch_up(self, *, failed: bool) -> None:
+        self._before = taken_before(replace(self._job, go_on=self._job.go_on or failed))
+
+    def _next_part(self) -> int:
+        return self._before.left
+
+    def _preview(self) -> None:
+        before = self._before
+        taken = f", {before.samples} taken before" if before.samples else ""
+        self._reporter.report(f"session with a tracker, readings: {before.left}, repeats among them{taken}")
+        if left_open := of_one_point(self._rig):
+            self._reporter.report(left_open)
+
+    def _measure(self) -> bool:
+        job, before, path = self._job, self._before, next_part(self._out)
+        self._reporter.step("measurement")
         try:
-            _take(job, before, clock, console, feed, person)
-            break
+            with (
+                new_recording(path, job.text, self._clock, before.notes) as writer,
+                connected_tracker(job.rig, job.addresses, writer, self._clock, self._feed) as bench,
+            ):
+                summary = record_tracked(
+                    bench,
+                    job.rig,
+                    writer,
+                    before,
+                    self._clock,
+                    progress_bar(self._console),
+                    feed=self._feed,
+                    terminal=self._person.keyboard,
+                    earlier=Earlier(self._out, before.samples),
+                    reporter=self._reporter,
+                )
         except PartialResult as early:
-            reporter.ended_early(early)
-            if not person.goes_on(early):
-                raise
-            broken = True
-    reporter.step("results")
-    files = parts(job.out)
-    from calibeam.results.session_results import (
-        write_session_results,  # a second of libraries that no device waits for
-    )
-
-    write_session_results(files[0] if len(files) == 1 else job.out, console)
-
-
-def _take(job: TrackedJob, before: TakenBefore, clock: Clock, console: Console, feed: Feed, person: Person) -> None:
-    """What is left, into a further recording."""
-    path, reporter = next_part(job.out), person.reporter
-    reporter.step("measurement")
-    with (
-        new_recording(path, job.text, clock, before.notes) as writer,
-        connected_tracker(job.rig, job.addresses, writer, clock, feed) as bench,
-    ):
-        summary = record_tracked(
-            bench,
-            job.rig,
-            writer,
-            before,
-            clock,
-            progress_bar(console),
-            feed=feed,
-            terminal=person.keyboard,
-            earlier=Earlier(job.out, before.samples),
-            reporter=reporter,
-        )
-    reporter.report(f"samples {len(summary.samples)}, skipped {summary.skipped}; recording: {path}")
+            self._reporter.ended_early(early)
+            raise
+        self._reporter.report(f"samples {len(summary.samples)}, skipped {summary.skipped}; recording: {path}")
+        return False
 
 
 def record_tracked(
@@ -176,7 +170,7 @@ def record_tracked(
     terminal: int | None = None,
     earlier: Earlier | None = None,
     reporter: StatusReporter | None = None,
-) -> TrackedSummary:
+) -> Summary[TrackedSample]:
     """Take the poses that are left. PartialResult when it ended early: the arm stands, samples are kept.
 
     `terminal`: file descriptor that keys are read from: SPACE or Ctrl-C pauses, as in a session with detectors.
@@ -198,16 +192,7 @@ def record_tracked(
             if state is RunState.PAUSED:
                 reporter.report("r goes on, s ends here, a aborts")
 
-        control = RunControl(
-            bench.stop,
-            clock,
-            lambda: bench.supervisor.failure,
-            told,
-            hold_arm=bench.hold,
-            undelivered=reporter.undelivered,
-            rests_in_s=bench.rests_in_s,
-            ease_arm=bench.ease,
-        )
+        control = control_of(bench, clock, reporter, told)
         journal, home_rad = RecordingJournal(writer, clock), np.array(rig.motion.home_rad)
         session = TrackedSession(
             bench, journal, options or TrackedOptions(), home_rad, nominal_target(rig),
@@ -219,7 +204,7 @@ def record_tracked(
             except PartialResult as early:
                 INTERRUPTS.close()  # a recording is being closed
                 raise PartialResult(f"{early}; {GO_ON}") from early.__cause__
-    writer.event(Event(clock.now_s(), "end", {"samples": len(summary.samples), "skipped": summary.skipped}))
+    end_event(writer, clock, summary)
     return summary
 
 

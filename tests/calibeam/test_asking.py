@@ -20,7 +20,7 @@ from calibeam.commands import centre, psd_check
 from calibeam.motion import by_hand, task_by_hand
 from calibeam.sessions import run as on_site
 from calibeam.sessions import with_tracker
-from calibeam.sessions.run import OnSite
+from calibeam.sessions.with_detectors import WithDetectors
 
 ROOT = Path(__file__).parents[2]
 RIG, CAMERA_RIG, TRACKER_RIG = (
@@ -39,7 +39,7 @@ ASKS = {
     "calibeam/motion/task_by_hand.py",
     "calibeam/sessions/keys.py",
     "calibeam/sessions/person.py",
-    "calibeam/sessions/run.py",
+    "calibeam/sessions/with_detectors.py",
     "calibeam/sessions/with_tracker.py",
 }
 TASK = """[transform]
@@ -98,10 +98,9 @@ def command(monkeypatch, tmp_path, quick) -> Callable[[str], list[str]]:
     ):  # fmt: skip
         monkeypatch.setattr(by_hand, name, stand_in)
         monkeypatch.setattr(task_by_hand, name, stand_in)
-    for session in (on_site, with_tracker):
-        monkeypatch.setattr(session, "devices_ready", lambda *_: None)
-    monkeypatch.setattr(OnSite, "_plan", lambda *_: None)
-    monkeypatch.setattr(OnSite, "_measure", moves)
+    monkeypatch.setattr(on_site, "devices_ready", lambda *_: None)
+    monkeypatch.setattr(WithDetectors, "_preview", lambda *_: None)
+    monkeypatch.setattr(WithDetectors, "_measure", moves)
     monkeypatch.setattr("calibeam.devices.camera.open_camera", moves)
     monkeypatch.setattr(centre, "connected", moves)
     monkeypatch.setattr(with_tracker, "connected_tracker", moves)

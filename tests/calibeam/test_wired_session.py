@@ -15,7 +15,7 @@ from rich.console import Console
 from acquisition.recording import Recording, RecordingWriter, read
 from acquisition.recording.rig import Rig, rig_text
 from acquisition.session.plan import PlanOptions
-from acquisition.session.session import Summary
+from acquisition.session.stepping import Summary
 from calibeam.devices.recorder import record_session
 from calibeam.devices.site import addresses_of, connected
 from calibeam.emulation import Emulation

@@ -26,7 +26,7 @@ from acquisition.centring.navigator import Navigator
 from acquisition.errors import SpotLostError, UnreachableError
 from acquisition.motion.kinematics import flange, inverse, transform
 from acquisition.recording.rig import Camera
-from acquisition.session.records import Journal, Learner
+from acquisition.session.records import Events, Learner
 
 Floats = NDArray[np.float64]
 
@@ -136,7 +136,7 @@ def _rms(values: Sequence[np.floating]) -> float:
 class CameraMeasuring:
     """One measurement; the only owner of where the arm stands meanwhile."""
 
-    def __init__(self, bench: Bench, learner: Learner, eye: Eye, camera: Camera, journal: Journal) -> None:
+    def __init__(self, bench: Bench, learner: Learner, eye: Eye, camera: Camera, journal: Events) -> None:
         self._bench, self._learner, self._eye, self._journal = bench, learner, eye, journal
         self._board, self._drawn = Board(camera.board), drawn(camera)
         self._on_fixture = transform(camera.board.in_psd1.origin_m, camera.board.in_psd1.rotation_rad)

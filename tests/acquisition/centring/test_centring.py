@@ -31,7 +31,7 @@ class Plane:
             Spot(*(spots[2 * k : 2 * k + 2] if lit[k] else (np.nan, np.nan)), 1.0, 1e-7, 1e-7, lit=lit[k])
             for k in range(2)
         ]
-        return Look(0.0, 0.0, self.q_rad, np.zeros(6), self.q_rad, None, faces[0], faces[1], {}, settled=True)
+        return Look(0.0, 0.0, self.q_rad, np.zeros(6), self.q_rad, None, {}, True, faces[0], faces[1])
 
 
 class Wide:

@@ -10,7 +10,7 @@ from acquisition.errors import AcquisitionError
 from acquisition.recording import RigFileError
 from acquisition.recording.pose_plan import PlannedBlock, PlannedPose, PosePlan, read_pose_plan, write_pose_plan
 from acquisition.session.plan import PlanOptions
-from acquisition.session.planned import PlannedSession, check_planned
+from acquisition.session.planned import check_planned
 from acquisition.session.session import Session
 from calibeam.learner import FittedLearner
 
@@ -45,8 +45,8 @@ def plan(rig, plain_rig) -> PosePlan:
 
 def run(rig, bench, plan):
     kept = Kept()
-    session = PlannedSession(bench, FittedLearner(rig), kept, OPTIONS, np.array(rig.motion.home_rad))
-    return session.run(plan), kept
+    session = Session(bench, FittedLearner(rig), kept, OPTIONS, np.array(rig.motion.home_rad))
+    return session.take_planned(plan), kept
 
 
 def test_every_pose_is_taken_as_asked(rig, bench_of, plan):

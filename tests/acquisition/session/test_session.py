@@ -13,7 +13,8 @@ from acquisition.centring.strategies import CentringBy, CentringChoice
 from acquisition.errors import NoLightError, RefusedMotionError
 from acquisition.session.plan import PlanOptions, blocks
 from acquisition.session.records import Phase, Sample
-from acquisition.session.session import Session, Summary
+from acquisition.session.session import Session
+from acquisition.session.stepping import Summary
 from calibeam.learner import FittedLearner
 from drivers.errors import DeviceRefused
 from tests.support.direct_bench import DirectBench, direct_bench

@@ -11,13 +11,13 @@ from acquisition.errors import AcquisitionError, RefusedMotionError
 from acquisition.recording.pose_plan import PlannedBlock, PlannedPose, PosePlan
 from acquisition.session.control import RunControl, RunEvent, RunState
 from acquisition.session.tracked import TrackedOptions, TrackedSession
-from acquisition.wires.bench import Speeds
-from acquisition.wires.tracker_bench import TargetLook, TrackerBench, TrackerPumps
+from acquisition.wires.bench import Pumps, Speeds
+from acquisition.wires.tracker_bench import TargetLook, TrackerBench
 from drivers.device import Block
 from drivers.errors import DeviceLost, DeviceStale
 
 HOME = np.zeros(2)
-LOOK = TargetLook(0.0, 0.0, HOME, HOME, HOME, None, np.zeros(3), np.full(3, 1e-6), 10, {"hall": 21.0}, settled=True)
+LOOK = TargetLook(0.0, 0.0, HOME, HOME, HOME, None, {"hall": 21.0}, True, np.zeros(3), np.full(3, 1e-6), 10)
 
 
 def nominal_m(q_rad: np.ndarray) -> np.ndarray:
@@ -130,7 +130,7 @@ def bench_of(readings: Readings) -> TrackerBench:
     )
     supervisor = SimpleNamespace(check=lambda: None)
     clock = SimpleNamespace(now_s=lambda: readings.latest().host_s[-1])
-    return TrackerBench(None, TrackerPumps(readings, robot), Speeds(1.0, 1.0), supervisor, clock, 100.0)
+    return TrackerBench(None, Pumps(readings, robot), Speeds(1.0, 1.0), supervisor, clock, rate_hz=100.0)
 
 
 def ringing(n: int, swing_m: float = 1e-3) -> np.ndarray:

@@ -38,6 +38,6 @@ def samples(rig: Rig, ahead: Ahead) -> list[Sample]:
         shaken = q_rad + rng.normal(0.0, rig.noise.joint_rad or 0.0, 6)
         x1, y1, x2, y2 = believed.expect(shaken, key.placement, key.first).spots_m + rng.normal(0.0, sigma_m, 4)
         psd1, psd2 = (Spot(x, y, 4.0, sigma_m, sigma_m, lit=True) for x, y in ((x1, y1), (x2, y2)))
-        look = Look(8.0 * k, 8.0 * k, q_rad, np.zeros(6), q_rad, None, psd1, psd2, {}, True, None, 0.1)
+        look = Look(8.0 * k, 8.0 * k, q_rad, np.zeros(6), q_rad, None, {}, True, psd1, psd2, None, 0.1)
         out.append(Sample(look, key.placement, key.first, np.zeros(6, dtype=np.int64), None, False))
     return out

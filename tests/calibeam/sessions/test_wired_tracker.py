@@ -19,10 +19,10 @@ from calibeam.printing.progress import progress_bar
 from calibeam.sessions.with_tracker import (
     TakenBefore,
     TrackedJob,
+    WithTracker,
     drawn_plan,
     nominal_target,
     record_tracked,
-    run_tracked,
     taken_before,
 )
 from calibeam.site_log import SITE_LOG
@@ -130,7 +130,7 @@ def test_paused_by_one_interrupt_ended_by_three_and_gone_on_with(tmp_path: Path,
         before = taken_before(job)
         assert (before.plan, before.done) == (PLAN, frozenset({1, 2}))
         for _ in ("the rest", "nothing"):
-            run_tracked(job, Console(quiet=True), asking=None, agrees=True)
+            WithTracker(job, Console(quiet=True), asking=None, agrees=True).run()
     assert concluded == [tmp_path, tmp_path]
     assert taken_before(job).left == 0
     twice, once = (read(tmp_path / name).samples.joints() for name in ("paused.mcap", "recording-0002.mcap"))
@@ -177,7 +177,7 @@ def test_a_control_child_that_dies_or_freezes_is_reported_and_a_person_decides(
         wires = tracker_addresses_of(RIG, emulation.address, PACE)
         job = TrackedJob(RIG, rig_text(RIG_FILE), tmp_path, wires, PLAN)
         with SITE_LOG.heard("info"):
-            run_tracked(job, Console(quiet=True), asking=person, agrees=False)
+            WithTracker(job, Console(quiet=True), asking=person, agrees=False).run()
     assert person.asked == ["may it move", "the arm was stopped, and the recording is closed:", "may it move"]
     log = (tmp_path / "session.log").read_text()
     assert f"of this program ({children[0]}) {says}" in log

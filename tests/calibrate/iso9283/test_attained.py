@@ -10,6 +10,7 @@ from acquisition.recording.samples import measured_sha256
 from calibrate.apply.correct.corrected import Options, Wanted, correct
 from calibrate.errors import DataError
 from calibrate.iso9283.attained import evaluate
+from tests.calibrate.apply.correct.six_joints import inverse as inverse_kinematics
 from tests.calibrate.iso9283.tracked_six_joints import (
     DEVICE,
     DRAWN,
@@ -22,8 +23,6 @@ from tests.calibrate.iso9283.tracked_six_joints import (
     planned_rad,
     seen,
 )
-
-from ..correct.six_joints import inverse as inverse_kinematics
 
 Q = planned_rad()
 POSE = cycles(6)

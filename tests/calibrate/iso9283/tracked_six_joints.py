@@ -9,9 +9,8 @@ from calibrate.iso9283.cube import CYCLE, cube_poses_m
 from calibrate.model.arms.rig_arm import RigArm
 from calibrate.model.model_file import RigIdentity
 from calibrate.model.rigid import inverse, transform
-
-from ..correct.six_joints import CHAIN, RIG, model
-from ..correct.six_joints import inverse as inverse_kinematics
+from tests.calibrate.apply.correct.six_joints import CHAIN, RIG, model
+from tests.calibrate.apply.correct.six_joints import inverse as inverse_kinematics
 
 POINT_M = (0.03, 0.01, 0.08)
 DEVICE = ((1.8, -0.7, 0.4), (0.1, 0.2, 2.5))

@@ -13,8 +13,7 @@ from calibrate.apply.export.nominal_table import cells, nominal_table, to_sigma
 from calibrate.model.model_file import read_model, write_model
 from calibrate.report.evidence.session_evidence import session_evidence
 from calibrate.report.sections.parameter_tables import table_part
-
-from ..export.tracked import tracked
+from tests.calibrate.apply.export.tracked import tracked
 
 WRONG_M = 3e-4  # of origins; of axes in rad
 

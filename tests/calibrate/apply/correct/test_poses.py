@@ -15,8 +15,7 @@ from calibrate.apply.predicting import placed
 from calibrate.errors import DataError
 from calibrate.model.model_file import write_model
 from tests.calibrate.apply.correct.six_joints import CHAIN, SIGMA, drawn, inverse, model, postures, real
-
-from ..physics.two_joints import PLAY_RAD, two_joints
+from tests.calibrate.model.with_effects.two_joints import PLAY_RAD, two_joints
 
 Q = postures(4)
 T = drawn().frames(Q)[:, -1]

@@ -21,9 +21,8 @@ from calibrate.model.model_file import (
     RigIdentity,
     write_model,
 )
-
-from ..correct.six_joints import CHAIN, RIG, model, postures
-from ..physics.two_joints import two_joints
+from tests.calibrate.apply.correct.six_joints import CHAIN, RIG, model, postures
+from tests.calibrate.model.with_effects.two_joints import two_joints
 
 COMPLIANCE_RAD_NM = 2e-5
 Q = postures(6)

@@ -17,9 +17,8 @@ from calibrate.model.arms.catalogue import arm_of
 from calibrate.model.arms.coupled_readings import by_reading
 from calibrate.model.model_file import Covariance, ModelParameter, RigIdentity
 from calibrate.model.parameters import values_by_name
+from tests.calibrate.apply.correct.six_joints import model
 from tests.calibrate.apply.export import test_export
-
-from ..correct.six_joints import model
 
 TEXT = rig_text(shipped_rigs()["fanuc-lrmate-200id"])
 FANUC = parse_rig(TEXT, "rig.toml")

@@ -18,8 +18,7 @@ from calibrate.model.arms.catalogue import arm_of
 from calibrate.model.arms.convert import convert
 from calibrate.model.arms.rig_arm import RigArm
 from calibrate.model.model_file import ModelParameter, RigIdentity, write_model
-
-from ..correct.six_joints import RIG, model, postures
+from tests.calibrate.apply.correct.six_joints import RIG, model, postures
 
 IRB = parse_rig(RIG, "rig.toml")
 FANUC_TEXT = rig_text(shipped_rigs()["fanuc-lrmate-200id"])

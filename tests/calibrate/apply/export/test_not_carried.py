@@ -14,8 +14,7 @@ from calibrate.apply.export.export import FORMS, export_model, form_named
 from calibrate.apply.export.not_carried import not_carried
 from calibrate.model.model_file import read_model
 from calibrate.model.predict import Predictor
-
-from ..physics.two_joints import PLAY_RAD, REACH_M, two_joints
+from tests.calibrate.model.with_effects.two_joints import PLAY_RAD, REACH_M, two_joints
 
 MODELS = Path(__file__).parents[3] / "golden" / "data" / "formats" / "models"
 ANY_MAKE = [form for form in FORMS if form.make is None]  # the others are for arms of one make

@@ -13,8 +13,7 @@ from calibrate.model.effects.catalogue import EFFECTS, missing_of, terms_of
 from calibrate.model.effects.causes import causes_of
 from calibrate.model.effects.term import Shape
 from simulators.conceal.wanted import FAMILIES
-
-from ..effects.conftest import full_session
+from tests.calibrate.model.effects.conftest import full_session
 
 # Version 1 as it was published: names may be added, none may go.
 PROMISED = {

@@ -27,9 +27,8 @@ from calibrate.model.sensors.catalogue import kind_of
 from simulators.conceal.case import conceal
 from simulators.conceal.case_files import write_case
 from simulators.conceal.wanted import FAMILIES, Wanted
+from tests.calibrate.model.effects.conftest import SEED, with_every_driver
 from tests.calibrate.model.with_effects.test_conditions_of_catalogue import listed
-
-from ..effects.conftest import SEED, with_every_driver
 
 SAMPLES = 45
 PLAIN = 1e-5  # rad, m or a share: the largest that an effect adds at its port

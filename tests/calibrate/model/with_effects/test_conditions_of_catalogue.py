@@ -29,8 +29,7 @@ from calibrate.model.with_effects.applied import needed_columns, recorded_condit
 from simulators.conceal.case import conceal
 from simulators.conceal.case_files import write_case
 from simulators.conceal.wanted import FAMILIES, Wanted
-
-from ..effects.conftest import SAMPLES, SEED, with_every_driver
+from tests.calibrate.model.effects.conftest import SAMPLES, SEED, with_every_driver
 
 PLAIN = 1e-4  # rad, m or a share: the largest that the effect adds at its port
 NAME = "one-effect"

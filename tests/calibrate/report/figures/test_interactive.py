@@ -13,7 +13,7 @@ from calibrate.report.evidence.session_evidence import session_evidence
 from calibrate.report.figures.plots import interactive_chapter
 from calibrate.report.figures.session_figures import session_figures
 
-REPORT = Path(calibrate.report.__file__).parent / "figures"
+REPORT = Path(calibrate.report.__file__).parent
 
 
 @pytest.fixture(scope="module")
