@@ -14,19 +14,18 @@ from calibrate.effects.time_laws import FOR_A_WHILE
 from simulators.arm.rigid import Vector
 from simulators.arm.statics import Load, Weight, carried_by, loaded_by
 from simulators.defects import Defect
+from simulators.defects.base import CarriedBase
 from simulators.defects.defect import as_vector
 from simulators.defects.displacement import CarriedPart, Course
 from simulators.defects.drive import (
     GearRunout,
-    HardeningSpring,
     PayloadOnSoftJoint,
     PressedJoint,
-    SlackUnderWeight,
     TwoSlopeFlexspline,
 )
-from simulators.defects.encoder import RADIUS_M, EccentricDisc, EncoderSlip, OvalRing
+from simulators.defects.encoder import OvalRing
 from simulators.defects.fixture import CarriedCones, CarriedFixture, CarriedTable, MovedCone
-from simulators.defects.link import FlatLink, HeatedLink, LaggingLink, WarmingUp, WornBearing, cantilever
+from simulators.defects.link import FlatLink, WornBearing, cantilever
 from simulators.defects.tracker import CarriedDevice
 
 Floats = NDArray[np.float64]
@@ -40,17 +39,9 @@ NOWHERE: Vector = (0.0, 0.0, 0.0)
 # --- joints
 
 
-def make_eccentric(f: FoundEffect) -> Defect:
-    return EccentricDisc(f.number, f.size("amplitude_rad") * RADIUS_M, -f.size("phase_rad"))
-
-
 def make_ring(f: FoundEffect) -> Defect:
     lobes = f.term.order or 2
     return OvalRing(f.number, lobes * f.size("amplitude_rad"), -(f.size("phase_rad") + math.pi) / lobes, lobes)
-
-
-def make_runout(f: FoundEffect) -> Defect:
-    return GearRunout(f.number, f.size("amplitude_rad") * WHEEL_M, f.size("order_per_turn"), 0.0, -f.size("phase_rad"))
 
 
 def make_of_unknown_period(f: FoundEffect) -> Defect:
@@ -62,11 +53,6 @@ def make_of_unknown_period(f: FoundEffect) -> Defect:
 def make_two_slopes(f: FoundEffect) -> Defect:
     below = max(f.size("compliance_rad_nm"), LEAST * 1e-3)
     return TwoSlopeFlexspline(f.number, below, f.size("compliance_above_rad_nm") / below, f.size("knee_nm"))
-
-
-def make_hardening(f: FoundEffect) -> Defect:
-    change = f.size("compliance_change_rad_nm") / f.largest_nm**2
-    return HardeningSpring(f.number, f.size("compliance_at_rest_rad_nm"), change)
 
 
 def make_pressed(f: FoundEffect) -> Defect:
@@ -84,14 +70,9 @@ def make_payload(f: FoundEffect) -> Defect:
     return PayloadOnSoftJoint(f.number, soft, as_vector(f.coefficients[1:] / soft))
 
 
-def make_under_weight(f: FoundEffect) -> Defect:
+def friction_nm(f: FoundEffect) -> float:
     known = "turning_torque_nm" in f.sizes
-    turns_nm = f.size("turning_torque_nm") if known else f.size("turning_torque_share") * f.largest_nm
-    return SlackUnderWeight(f.number, f.size("play_rad"), FRICTION_WIDTH * turns_nm)
-
-
-def make_slip(f: FoundEffect) -> Defect:
-    return EncoderSlip(f.number, -f.size("slip_rad"), f.size("time_s") - f.session.start_s)
+    return FRICTION_WIDTH * (f.size("turning_torque_nm") if known else f.size("turning_torque_share") * f.largest_nm)
 
 
 # --- links and base
@@ -118,26 +99,14 @@ def make_flat(f: FoundEffect) -> Defect:
     return FlatLink(f.number, u, v, as_vector(across / np.linalg.norm(across)))
 
 
-def make_heated(f: FoundEffect) -> Defect:
-    return HeatedLink(f.number, f.size("expansion_per_k"), f.thermometer)
-
-
-def make_lagging(f: FoundEffect) -> Defect:
-    return LaggingLink(f.number, f.size("expansion_per_k"), f.thermometer, f.size("lag_s"))
-
-
-def make_warming(f: FoundEffect, first: int, last: int) -> Defect:
-    return WarmingUp(first, last, f.size("growth_share"), f.size("time_constant_s"))
-
-
 def course_of(f: FoundEffect) -> tuple[Course, float, float]:
     """Course, moment and duration on the session's clock."""
     if f.thermometer:
         return "warmth", 0.0, 1.0
     if f.term.shape is Shape.STEP and "until_s" in f.sizes:
-        return "while", f.size("time_s") - f.session.start_s, f.size("until_s") - f.size("time_s")
+        return "while", f.at_s, f.size("until_s") - f.size("time_s")
     if f.term.shape is Shape.STEP:
-        return "step", f.size("time_s") - f.session.start_s, 1.0
+        return "step", f.at_s, 1.0
     if f.term.shape is Shape.EXPONENTIAL:
         return "settling", 0.0, f.size("time_constant_s")
     return "steady", 0.0, f.session.length_s
@@ -152,6 +121,11 @@ def carried(f: FoundEffect, pose: Floats, sense: float, kind: type[CarriedPart],
     about = f.session.own(pose, f.session.middle_m)
     shift, spin = as_vector(turn @ six[:3]), as_vector(turn @ six[3:])
     return kind(shift, spin, as_vector(about), course, at_s, over_s, f.thermometer, **more)
+
+
+def make_base(f: FoundEffect) -> Defect:
+    """The effect moves what stands around the arm."""
+    return carried(f, np.eye(4), -1.0, CarriedBase)
 
 
 def make_device(f: FoundEffect) -> Defect:
@@ -183,8 +157,7 @@ def make_cones(f: FoundEffect) -> Defect:
 
 def make_cone(f: FoundEffect) -> Defect:
     size = max(float(np.linalg.norm(f.coefficients)), LEAST * 1e-3)
-    cone, at_s = int(f.variant.removeprefix("seat ")), f.size("time_s") - f.session.start_s
-    return MovedCone(cone, size, as_vector(f.coefficients / size), at_s)
+    return MovedCone(int(f.variant.removeprefix("seat ")), size, as_vector(f.coefficients / size), f.at_s)
 
 
 # --- weights that load a spring as was found, where masses are not known or were corrected

@@ -1,7 +1,7 @@
 """Makes the mechanisms of tool, laser, detectors and devices from what was found, and those that have no name."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,10 +18,10 @@ from simulators.arm.drawing import origin_and_rotation
 from simulators.arm.rigid import Vector
 from simulators.defects import Defect
 from simulators.defects.defect import as_vector
-from simulators.defects.detector import StrainedFace, StrayLight, UnevenLayer, WavesOnFace
+from simulators.defects.detector import StrainedFace, StrayLight, WavesOnFace
 from simulators.defects.found_curve import CurveAtBase, CurveAtJoints, CurveAtLink, CurveInReading
 from simulators.defects.tool import CarriedLaser, CarriedTarget, ElasticMount, LaserWarmUp, SaggingMount, WarmLaser
-from simulators.defects.tracker import CircleOffCentre, DrumOutOfRound, TrackerScale, WireScale
+from simulators.defects.tracker import DrumOutOfRound, TrackerScale, WireScale
 
 Floats = NDArray[np.float64]
 LEAST = 1e-9  # of a share or a stiffness that another quantity is divided by
@@ -106,23 +106,18 @@ def make_moved_laser(f: FoundEffect) -> Defect:
 # --- detectors
 
 
-def half_m(f: FoundEffect) -> float:
-    return f.session.light.half_size_m
-
-
 def make_strained(f: FoundEffect) -> Defect:
     x, y = (f.sizes.get(f"gain_{axis}_error_share", 0.0) for axis in "xy")
     return StrainedFace(f.number, x, y, f.sizes.get("cross_share", 0.0))
 
 
-def layer(f: FoundEffect, powers: Sequence[tuple[int, int, int]]) -> Defect:
-    """`powers`: axis, i, j of each coefficient, in order."""
-    sizes = tuple((a, i, j, float(c)) for (a, i, j), c in zip(powers, f.coefficients, strict=True))
-    return UnevenLayer(f.number, sizes, half_m(f))
+def powers(*of_place: tuple[int, int, int]) -> Callable[[FoundEffect], tuple[tuple[int, int, int, float], ...]]:
+    """`of_place`: axis and the powers of x and y of each coefficient, in order."""
+    return lambda f: tuple((*one, float(c)) for one, c in zip(of_place, f.coefficients, strict=True))
 
 
-SQUARES = ((2, 0), (1, 1), (0, 2))
-CUBES = ((3, 0), (2, 1), (1, 2), (0, 3))
+SQUARES = [(axis, *of_x_y) for axis in (0, 1) for of_x_y in ((2, 0), (1, 1), (0, 2))]
+CUBES = [(axis, *of_x_y) for axis in (0, 1) for of_x_y in ((3, 0), (2, 1), (1, 2), (0, 3))]
 
 
 def make_waves(f: FoundEffect) -> Defect:
@@ -155,11 +150,6 @@ def make_drum(f: FoundEffect) -> Defect:
     radius_m = f.size("period_m") / (2.0 * math.pi)
     bearing_rad = f.size("phase_rad") + math.pi
     return DrumOutOfRound(f.size("amplitude_m"), radius_m, bearing_rad, -bearing_rad * radius_m)
-
-
-def make_circle(f: FoundEffect) -> Defect:
-    which = "azimuth" if f.variant == "azimuth" else "elevation"
-    return CircleOffCentre(which, f.term.order or 1, f.size("amplitude_rad"), f.size("phase_rad"))
 
 
 # --- what has no name
