@@ -31,6 +31,7 @@ class Mechanism:
     PHYSICS: ClassVar[str]  # as in the interchange format; UNKNOWN when no catalogue has it
     PORT: ClassVar[str]  # where it sits: "joint{joint}.angle", as in the interchange format
     DRIVERS: ClassVar[tuple[str, ...]]  # what it depends on: "q{joint}", as in the interchange format
+    EVERY_JOINT: ClassVar[str] = ""  # in place of DRIVERS: "qd", where it depends on that of all its `joints`
     FIGURES: ClassVar[tuple[str, ...]] = ()  # fields that a diagnosis states under the same names
     ALSO: ClassVar[tuple[str, ...]] = ()  # physics that is truly at this port, too, as a part of the mechanism
 
@@ -40,6 +41,8 @@ class Mechanism:
 
     @property
     def drivers(self) -> tuple[str, ...]:
+        if self.EVERY_JOINT:
+            return tuple(f"{self.EVERY_JOINT}{joint}" for joint in range(1, vars(self)["joints"] + 1))
         return tuple(driver.format_map(vars(self)) for driver in self.DRIVERS)
 
     @property

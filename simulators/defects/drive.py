@@ -470,14 +470,11 @@ class Unsettled(Defect):
     KIND = "unsettled"
     PHYSICS = "not-settled"
     PORT = "time"
+    EVERY_JOINT = "last_move"
     SIZE = "left"
     TYPICAL = 1e-5
     INSTRUMENTS = ROBOT
     HABIT = "direct"
-
-    @property
-    def drivers(self) -> tuple[str, ...]:
-        return tuple(f"last_move{joint}" for joint in range(1, self.joints + 1))
 
     @property
     def figures(self) -> dict[str, float]:
@@ -501,15 +498,12 @@ class LateClock(Defect):
     KIND = "late-clock"
     PHYSICS = "latency"
     PORT = "time"
+    EVERY_JOINT = "qd"
     SIZE = "late_s"
     TYPICAL = 2e-3
     INSTRUMENTS = ROBOT
     HABIT = "moving"
     NEEDS = ("qd",)
-
-    @property
-    def drivers(self) -> tuple[str, ...]:
-        return tuple(f"qd{joint}" for joint in range(1, self.joints + 1))
 
     @property
     def figures(self) -> dict[str, float]:

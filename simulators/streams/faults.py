@@ -86,10 +86,7 @@ class LateStamps(StreamFault):
     KIND = "stream-late-stamps"
     PHYSICS = "latency"
     PORT = "time"
-
-    @property
-    def drivers(self) -> tuple[str, ...]:
-        return tuple(f"qd{joint}" for joint in range(1, self.joints + 1))
+    EVERY_JOINT = "qd"
 
     @property
     def figures(self) -> dict[str, float]:
@@ -182,10 +179,7 @@ class EarlyReading(StreamFault):
     KIND = "stream-early-reading"
     PHYSICS = "not-settled"
     PORT = "time"
-
-    @property
-    def drivers(self) -> tuple[str, ...]:
-        return tuple(f"last_move{joint}" for joint in range(1, self.joints + 1))
+    EVERY_JOINT = "last_move"
 
     @property
     def figures(self) -> dict[str, float]:
