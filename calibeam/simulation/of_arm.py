@@ -31,9 +31,15 @@ from simulators.defects.tracker import CarriedDevice
 Floats = NDArray[np.float64]
 WHEEL_M = 0.05  # pitch radius of the wheel of a simulated gear; only runout over radius shows
 FRICTION_WIDTH = 1.4  # of the smooth turn-over's torque: a straight turn-over that differs from it least
-LEAST = 1e-9  # of a share or a stiffness that another quantity is divided by
+LEAST = 1e-12  # of a size or a stiffness that another quantity is divided by
 PARALLEL = 0.1  # sine between a link and the next joint's axis
 NOWHERE: Vector = (0.0, 0.0, 0.0)
+ZERO = np.zeros(3)
+
+
+def size_and_direction(values: Floats) -> tuple[float, Floats]:
+    size = max(float(np.linalg.norm(values)), LEAST)
+    return size, values / size
 
 
 # --- joints
@@ -51,22 +57,21 @@ def make_of_unknown_period(f: FoundEffect) -> Defect:
 
 
 def make_two_slopes(f: FoundEffect) -> Defect:
-    below = max(f.size("compliance_rad_nm"), LEAST * 1e-3)
+    below = max(f.size("compliance_rad_nm"), LEAST)
     return TwoSlopeFlexspline(f.number, below, f.size("compliance_above_rad_nm") / below, f.size("knee_nm"))
 
 
 def make_pressed(f: FoundEffect) -> Defect:
-    push = FORCE_N * f.coefficients
-    size = max(float(np.linalg.norm(f.coefficients)), LEAST * 1e-3)
+    size, along = size_and_direction(f.coefficients)
     point = f.session.predictor.rig.tool.point_m or NOWHERE
-    return PressedJoint(f.number, size, as_vector(push / size), point)
+    return PressedJoint(f.number, size, as_vector(FORCE_N * along), point)
 
 
 def make_payload(f: FoundEffect) -> Defect:
     if len(f.coefficients) == 1:
         return PayloadOnSoftJoint(f.number, f.size("compliance_rad_nm"))
     soft = float(f.coefficients[0])
-    soft = soft if abs(soft) > LEAST * 1e-3 else LEAST * 1e-3
+    soft = soft if abs(soft) > LEAST else LEAST
     return PayloadOnSoftJoint(f.number, soft, as_vector(f.coefficients[1:] / soft))
 
 
@@ -112,15 +117,26 @@ def course_of(f: FoundEffect) -> tuple[Course, float, float]:
     return "steady", 0.0, f.session.length_s
 
 
+def displaced(
+    f: FoundEffect,
+    kind: type[CarriedPart],
+    shift_m: Floats,
+    turn_rad: Floats = ZERO,
+    about_m: Floats = ZERO,
+    **more: float,
+) -> Defect:
+    """A part that goes this way in the course of the effect."""
+    course, at_s, over_s = course_of(f)
+    way = as_vector(shift_m), as_vector(turn_rad), as_vector(about_m)
+    return kind(*way, course, at_s, over_s, f.thermometer, **more)
+
+
 def carried(f: FoundEffect, pose: Floats, sense: float, kind: type[CarriedPart], **more: float) -> Defect:
     """The six of a motion about the middle of what was reached, in a part's own frame `pose`."""
     turn = pose[:3, :3].T
     six = np.zeros(6)
     six[: len(f.coefficients)] = sense * f.coefficients
-    course, at_s, over_s = course_of(f)
-    about = f.session.own(pose, f.session.middle_m)
-    shift, spin = as_vector(turn @ six[:3]), as_vector(turn @ six[3:])
-    return kind(shift, spin, as_vector(about), course, at_s, over_s, f.thermometer, **more)
+    return displaced(f, kind, turn @ six[:3], turn @ six[3:], f.session.own(pose, f.session.middle_m), **more)
 
 
 def make_base(f: FoundEffect) -> Defect:
@@ -156,8 +172,8 @@ def make_cones(f: FoundEffect) -> Defect:
 
 
 def make_cone(f: FoundEffect) -> Defect:
-    size = max(float(np.linalg.norm(f.coefficients)), LEAST * 1e-3)
-    return MovedCone(int(f.variant.removeprefix("seat ")), size, as_vector(f.coefficients / size), f.at_s)
+    size, along = size_and_direction(f.coefficients)
+    return MovedCone(int(f.variant.removeprefix("seat ")), size, as_vector(along), f.at_s)
 
 
 # --- weights that load a spring as was found, where masses are not known or were corrected

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibeam.simulation.found import FoundEffect
-from calibeam.simulation.of_arm import course_of
+from calibeam.simulation.of_arm import NOWHERE, displaced, size_and_direction
 from calibrate.effects.laser_pointing import beam_axes
 from calibrate.effects.ports import Place
 from calibrate.effects.since_model import line_of
@@ -24,8 +24,7 @@ from simulators.defects.tool import CarriedLaser, CarriedTarget, ElasticMount, L
 from simulators.defects.tracker import DrumOutOfRound, TrackerScale, WireScale
 
 Floats = NDArray[np.float64]
-LEAST = 1e-9  # of a share or a stiffness that another quantity is divided by
-NOWHERE: Vector = (0.0, 0.0, 0.0)
+LEAST = 1e-9  # of a share of foreign light, which the place of it is divided by
 
 
 # --- tool and laser
@@ -71,8 +70,8 @@ def across(f: FoundEffect) -> tuple[float, Vector, Vector]:
     """Size, direction and origin of what happens along two axes across the beam."""
     origin, u, v = beam_axes(f.session.drivers)
     both = f.coefficients[0] * u + f.coefficients[1] * v
-    size = max(float(np.linalg.norm(both)), LEAST * 1e-3)
-    return size, as_vector(both / size), as_vector(origin)
+    size, along = size_and_direction(both)
+    return size, as_vector(along), as_vector(origin)
 
 
 def make_pointing(f: FoundEffect) -> Defect:
@@ -84,23 +83,18 @@ def make_pointing(f: FoundEffect) -> Defect:
 
 def make_walking(f: FoundEffect) -> Defect:
     size, along, _ = across(f)
-    course, at_s, over_s = course_of(f)
-    shift = as_vector(size * np.array(along))
-    return CarriedLaser(shift, NOWHERE, NOWHERE, course, at_s, over_s, f.thermometer)
+    return displaced(f, CarriedLaser, size * np.array(along))
 
 
 def make_target(f: FoundEffect) -> Defect:
-    course, at_s, over_s = course_of(f)
-    return CarriedTarget(as_vector(f.coefficients), NOWHERE, NOWHERE, course, at_s, over_s)
+    return displaced(f, CarriedTarget, f.coefficients)
 
 
 def make_moved_laser(f: FoundEffect) -> Defect:
     """Two small turns and shifts of one body add up; the turns are about the origin of the beam."""
     twist = line_of(f.session.drivers) @ f.coefficients
     origin = np.array(f.session.predictor.rig.tool.laser_origin_m or NOWHERE)
-    course, at_s, over_s = course_of(f)
-    shift = twist[:3] + np.cross(twist[3:], origin)
-    return CarriedLaser(as_vector(shift), as_vector(twist[3:]), as_vector(origin), course, at_s, over_s)
+    return displaced(f, CarriedLaser, twist[:3] + np.cross(twist[3:], origin), twist[3:], origin)
 
 
 # --- detectors
