@@ -32,7 +32,7 @@ class Mechanism:
     PORT: ClassVar[str]  # where it sits: "joint{joint}.angle", as in the interchange format
     DRIVERS: ClassVar[tuple[str, ...]]  # what it depends on: "q{joint}", as in the interchange format
     EVERY_JOINT: ClassVar[str] = ""  # in place of DRIVERS: "qd", where it depends on that of all its `joints`
-    FIGURES: ClassVar[tuple[str, ...]] = ()  # fields that a diagnosis states under the same names
+    FIGURES: ClassVar[tuple[str, ...]] = ()  # fields that a diagnosis states; "its name=field" where the names differ
     ALSO: ClassVar[tuple[str, ...]] = ()  # physics that is truly at this port, too, as a part of the mechanism
 
     @property
@@ -48,7 +48,8 @@ class Mechanism:
     @property
     def figures(self) -> Mapping[str, float]:
         """Its size in the words of a diagnosis, e.g. `amplitude_rad`; empty when there is no single number."""
-        return {name: float(getattr(self, name)) for name in self.FIGURES}
+        named = (figure.partition("=") for figure in self.FIGURES)
+        return {name: float(getattr(self, field or name)) for name, _, field in named}
 
 
 @dataclass(frozen=True)

@@ -89,10 +89,7 @@ class WrongRatio(DriveDefect):
     PHYSICS = "gear-ratio-error"
     SIZE = "excess"
     TYPICAL = 1e-4
-
-    @property
-    def figures(self) -> dict[str, float]:
-        return {"scale_error_rad_per_rad": self.excess}
+    FIGURES = ("scale_error_rad_per_rad=excess",)
 
     @classmethod
     def draw(cls, rng: np.random.Generator, site: Site) -> Self:
@@ -117,10 +114,7 @@ class CoupledWrist(DriveDefect):
     PHYSICS = "joint-coupling"
     DRIVERS = ("q{other}",)
     TYPICAL = 1e-4
-
-    @property
-    def figures(self) -> dict[str, float]:
-        return {"coupling_rad_per_rad": self.share}
+    FIGURES = ("coupling_rad_per_rad=share",)
 
     @classmethod
     def draw(cls, rng: np.random.Generator, site: Site) -> Self:
@@ -475,10 +469,7 @@ class Unsettled(Defect):
     TYPICAL = 1e-5
     INSTRUMENTS = ROBOT
     HABIT = "direct"
-
-    @property
-    def figures(self) -> dict[str, float]:
-        return {"left_share": self.left}
+    FIGURES = ("left_share=left",)
 
     @classmethod
     def draw(cls, rng: np.random.Generator, site: Site) -> Self:
@@ -504,10 +495,7 @@ class LateClock(Defect):
     INSTRUMENTS = ROBOT
     HABIT = "moving"
     NEEDS = ("qd",)
-
-    @property
-    def figures(self) -> dict[str, float]:
-        return {"delay_s": self.late_s}
+    FIGURES = ("delay_s=late_s",)
 
     @classmethod
     def draw(cls, rng: np.random.Generator, site: Site) -> Self:

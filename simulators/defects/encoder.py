@@ -152,10 +152,7 @@ class Slip(EncoderDefect):
     DRIVERS = ("t",)
     SIZE = "slip_rad"
     TYPICAL = 1e-4
-
-    @property
-    def figures(self) -> dict[str, float]:
-        return {"at_s": self.at_s, "step_rad": self.slip_rad}
+    FIGURES = ("at_s", "step_rad=slip_rad")
 
     def error_rad(self, shaft_rad: Floats, scene: Scene) -> Floats:
         return np.where(scene.t_s >= self.at_s, self.slip_rad, 0.0)
@@ -202,10 +199,7 @@ class SlowFilter(ControllerEncoderDefect):
     TYPICAL = 3e-5
     INSTRUMENTS = ROBOT
     HABIT = "direct"
-
-    @property
-    def figures(self) -> dict[str, float]:
-        return {"slope": self.missing}
+    FIGURES = ("slope=missing",)
 
     @classmethod
     def draw(cls, rng: np.random.Generator, site: Site) -> Self:

@@ -29,10 +29,7 @@ class BumpedFixture(BriefShift):
     TYPICAL = 3e-5
     TURNS_RAD_M = (0.0, 3.0)
     INSTRUMENTS = SPOTS
-
-    @property
-    def figures(self) -> dict[str, float]:
-        return {"at_s": self.at_s, "placement": float(self.place), "shift_m": self.shift_m}
+    FIGURES = ("at_s", "placement=place", "shift_m")
 
     @classmethod
     def draw(cls, rng: np.random.Generator, site: Site) -> Self:
@@ -63,10 +60,7 @@ class MovedCone(Defect):
     SIZE = "shift_m"
     TYPICAL = 4e-5
     INSTRUMENTS = ("seat",)
-
-    @property
-    def figures(self) -> dict[str, float]:
-        return {"at_s": self.at_s, "seat": float(self.cone), "shift_m": self.shift_m}
+    FIGURES = ("at_s", "seat=cone", "shift_m")
 
     @classmethod
     def draw(cls, rng: np.random.Generator, site: Site) -> Self:

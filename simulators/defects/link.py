@@ -214,10 +214,7 @@ class LaggingLink(HeatedLink):
     time_constant_s: float = 1800.0
 
     KIND = "lagging-link"
-
-    @property
-    def figures(self) -> dict[str, float]:
-        return {"expansion_per_k": self.expansion_per_k, "lag_s": self.time_constant_s}
+    FIGURES = ("expansion_per_k", "lag_s=time_constant_s")
 
     @classmethod
     def draw(cls, rng: np.random.Generator, site: Site) -> Self:

@@ -131,10 +131,7 @@ class WarmLaser(Defect):
     TYPICAL = 6e-6  # 2 to 12 µrad/K
     INSTRUMENTS = SPOTS
     NEEDS = ("temp_laser_degC",)
-
-    @property
-    def figures(self) -> dict[str, float]:
-        return {"slope_rad_k": self.turn_rad_k}
+    FIGURES = ("slope_rad_k=turn_rad_k",)
 
     @classmethod
     def draw(cls, rng: np.random.Generator, site: Site) -> Self:

@@ -87,10 +87,7 @@ class LateStamps(StreamFault):
     PHYSICS = "latency"
     PORT = "time"
     EVERY_JOINT = "qd"
-
-    @property
-    def figures(self) -> dict[str, float]:
-        return {"latency_s": self.by_s}
+    FIGURES = ("latency_s=by_s",)
 
     @property
     def size(self) -> float:
@@ -115,10 +112,7 @@ class LaggingEncoder(StreamFault):
     PHYSICS = "reading-lag"
     PORT = "joint{joint}.angle"
     DRIVERS = ("qd{joint}",)
-
-    @property
-    def figures(self) -> dict[str, float]:
-        return {"behind_s": self.time_constant_s}
+    FIGURES = ("behind_s=time_constant_s",)
 
     @property
     def size(self) -> float:
@@ -180,10 +174,7 @@ class EarlyReading(StreamFault):
     PHYSICS = "not-settled"
     PORT = "time"
     EVERY_JOINT = "last_move"
-
-    @property
-    def figures(self) -> dict[str, float]:
-        return {"tau_s": self.time_constant_s}
+    FIGURES = ("tau_s=time_constant_s",)
 
     @property
     def size(self) -> float:
@@ -229,10 +220,7 @@ class SwingingFoot(StreamFault):
     PHYSICS = "ringing"
     PORT = "base.pose"
     DRIVERS = ("t",)
-
-    @property
-    def figures(self) -> dict[str, float]:
-        return {"frequency_hz": self.frequency_hz, "damping_share": self.damping}
+    FIGURES = ("frequency_hz", "damping_share=damping")
 
     @property
     def size(self) -> float:
