@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simulators.arm.rigid import Vector
-from simulators.arm.statics import Load
+from simulators.arm.statics import Load, Weight, carried_by, loaded_by
 from simulators.defects.scene import Light, Scene, Site
 
 Floats = NDArray[np.float64]
@@ -98,6 +98,24 @@ def with_size(defect: AnyDefect, size: float) -> AnyDefect:
 def size_of(defect: Defect) -> float:
     """The value of the field that scales the mechanism."""
     return float(getattr(defect, defect.SIZE))
+
+
+@dataclass(frozen=True)
+class UnderWeights(Defect):
+    """A part that yields to weights that are none of the stated masses, each times its compliance (see `Weight`).
+
+    To the payload, whose mass is known, it yields `payload_rad_nm`.
+    """
+
+    weights: tuple[Weight, ...]
+    payload_rad_nm: float = 0.0
+    share: float = 1.0
+
+    def felt(self, scene: Scene, load: Load, link: int, first: int = 0) -> tuple[Floats, Floats]:
+        """Moment about the start of link `link` and force, (row, 3), of the bodies from `first` on and the payload."""
+        own = loaded_by(load, [weight for weight in self.weights if weight.body >= first], link)
+        payload = carried_by(load, self.payload_rad_nm * scene.payload_kg, scene.payload_com_m, link)
+        return own[0] + payload[0], own[1] + payload[1]
 
 
 # --- drawing

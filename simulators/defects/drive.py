@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 
 from simulators.arm.kinematics import forward
 from simulators.arm.rigid import Vector
-from simulators.arm.statics import Load, Weight, carried_by, loaded_by, weigh
-from simulators.defects.defect import ROBOT, Defect, as_vector, direction, phase
+from simulators.arm.statics import Load, weigh
+from simulators.defects.defect import ROBOT, Defect, UnderWeights, as_vector, direction, phase
 from simulators.defects.scene import Scene, Site, UnsuitedError
 
 Floats = NDArray[np.float64]
@@ -403,24 +403,16 @@ class HardeningSpring(DriveDefect):
 
 
 @dataclass(frozen=True)
-class SpringUnderWeights(DriveDefect):
-    """A soft joint whose load is none of the stated masses: each weight is a mass times the spring's compliance.
-
-    To the payload, whose mass is known, it yields `payload_rad_nm`.
-    """
-
-    weights: tuple[Weight, ...]
-    payload_rad_nm: float = 0.0
-    share: float = 1.0
+class SpringUnderWeights(UnderWeights, DriveDefect):
+    """A soft joint under other weights than the stated masses."""
 
     KIND = "spring-under-weights"
     PHYSICS = "joint-compliance"
     DRIVERS = ("gravity_torque{joint}",)
 
     def turn_rad(self, shaft_rad: Floats, scene: Scene, load: Load) -> Floats:
-        own, _ = loaded_by(load, self.weights, self.joint)
-        payload, _ = carried_by(load, self.payload_rad_nm * scene.payload_kg, scene.payload_com_m, self.joint)
-        return self.share * (own + payload)[:, 2]
+        moment, _ = self.felt(scene, load, self.joint)
+        return self.share * moment[:, 2]
 
 
 @dataclass(frozen=True)
