@@ -29,12 +29,12 @@ def effects() -> str:
 
 
 def mechanisms() -> str:
-    """One row for each line of the table from effects to mechanisms."""
+    """One row for each entry of the table from effects to mechanisms."""
     rows = ["| effect | form | mechanism | what crosses over, and its unit | may differ by |", "|---|---|---|---|---|"]
     rows += [
-        f"| `{line.physics}` | {line.form} | `{line.mechanism.KIND}` | {line.crosses} | "
-        f"{100.0 * line.within:.0f} %{': ' + line.differs if line.differs else ''} |"
-        for line in TABLE
+        f"| `{form.physics}` | {form.name} | `{to.mechanism.KIND}` | {to.crosses} | "
+        f"{100.0 * to.within:.0f} %{': ' + to.differs if to.differs else ''} |"
+        for form, to in TABLE.items()
     ]
     return "\n".join(rows)
 

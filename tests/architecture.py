@@ -202,13 +202,13 @@ def figures() -> tuple[Figure, ...]:
 
 
 TODAY = {
-    "files": 807,  # docs/decisions/0042-what-is-promised.md
-    "code": 79_820,  # docs/decisions/0042-what-is-promised.md
+    "files": 829,  # docs/decisions/0043-floors-of-calibrate.md
+    "code": 80_750,  # docs/decisions/0043-floors-of-calibrate.md
     "longest_function": 53,
-    "one_importer": 11,
+    "one_importer": 12,  # docs/decisions/0043-floors-of-calibrate.md
     "classes": 26,
-    "file_names": 69,
-    "chain": 36,
+    "file_names": 65,
+    "chain": 38,  # docs/decisions/0043-floors-of-calibrate.md
 }
 
 if __name__ == "__main__":

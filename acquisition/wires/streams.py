@@ -22,6 +22,19 @@ STALE_S = 1.0  # twice what a reader itself waits: this is for one that hangs in
 LOOK_S = 0.05
 
 
+@contextmanager
+def in_thread(work: Callable[[threading.Event], None], name: str) -> Generator[None]:
+    """Inside, `work` runs in a thread of its own; at the end its event is set, and it is waited for."""
+    done = threading.Event()
+    thread = threading.Thread(target=work, args=(done,), name=name, daemon=True)
+    thread.start()
+    try:
+        yield
+    finally:
+        done.set()
+        thread.join()
+
+
 @dataclass(frozen=True)
 class _Watched:
     name: str
@@ -81,17 +94,13 @@ class Supervisor:
     def watching(self, name: str, newest_s: Callable[[], float | None], limit_s: float = STALE_S) -> Generator[None]:
         """Inside, the arm is stopped when the newest sample (host time; None: none yet) is older than the limit."""
         watched = _Watched(name, newest_s, self._clock.now_s(), limit_s)
-        done = threading.Event()
         with self._lock:
             self._turned_s = self._turned_s if self._watching else self._clock.now_s()
             self._watching += 1
-        watcher = threading.Thread(target=self._watch, args=(watched, done), name=f"watch {name}", daemon=True)
-        watcher.start()
         try:
-            yield
+            with in_thread(lambda done: self._watch(watched, done), f"watch {name}"):
+                yield
         finally:
-            done.set()
-            watcher.join()
             with self._lock:
                 self._watching -= 1
 

@@ -1,6 +1,7 @@
 """`calibeam log`: a device recorded for as long as it takes, without a session."""
 
 import math
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
@@ -26,6 +27,38 @@ log = App(
 MEGABYTE = 1e6
 
 
+@dataclass(frozen=True)
+class LogOptions:
+    """How long a log goes on, and in which segments.
+
+    Parameters
+    ----------
+    rotate_mb
+        Size of a segment from which the next is begun.
+    rotate_min
+        Age of a segment, in minutes, from which the next is begun.
+    for_s
+        End by itself after so many seconds.
+    json_
+        Print one line of JSON at the end, and nothing else.
+
+    """
+
+    rotate_mb: float = 256.0
+    rotate_min: float = 60.0
+    for_s: float | None = None
+    json_: Annotated[bool, Parameter(name="--json")] = False
+
+    @property
+    def rotation(self) -> Rotation:
+        """DeviceRefused for a size or an age that is none."""
+        if not (0.0 < self.rotate_mb < math.inf and 0.0 < self.rotate_min < math.inf):
+            raise DeviceRefused(
+                f"--rotate-mb {self.rotate_mb:g}, --rotate-min {self.rotate_min:g}: give finite numbers above 0"
+            )
+        return Rotation(round(self.rotate_mb * MEGABYTE), 60.0 * self.rotate_min)
+
+
 @log.command
 @logged
 def encoders(
@@ -33,10 +66,7 @@ def encoders(
     *,
     out: Path = Path("encoder-log"),
     raw: bool = True,
-    rotate_mb: float = 256.0,
-    rotate_min: float = 60.0,
-    for_s: float | None = None,
-    json_: Annotated[bool, Parameter(name="--json")] = False,
+    options: Annotated[LogOptions, Parameter(name="*")] = LogOptions(),
 ) -> None:
     """Log the encoders until Ctrl-C: positions and every CAN frame, in segments of which each is a whole recording.
 
@@ -58,22 +88,16 @@ def encoders(
     raw
         Also every frame on the bus, sent and received, as it was; `calibeam export` makes BLF, ASC, CSV or candump of
         them.
-    rotate_mb
-        Size of a segment from which the next is begun.
-    rotate_min
-        Age of a segment, in minutes, from which the next is begun.
-    for_s
-        End by itself after so many seconds.
-    json_
-        Print one line of JSON at the end, and nothing else.
+    options
+        Of the length of the log and its segments.
 
     """
-    rotation = _rotation(rotate_mb, rotate_min)
+    rotation = options.rotation
     loaded = load_rig(rig)
     device = loaded.devices.encoders
     if device is None:
         raise DeviceRefused(f"rig {loaded.name}: no [devices.encoders]; add it, with how the encoders are reached")
-    _log(EncoderLog(device, rig_text(rig), out, SystemClock(), rotation, raw=raw), out, for_s, json_=json_)
+    _log(EncoderLog(device, rig_text(rig), out, SystemClock(), rotation, raw=raw), out, options)
 
 
 @log.command
@@ -82,10 +106,7 @@ def tracker(
     rig: Path,
     *,
     out: Path = Path("tracker-log"),
-    rotate_mb: float = 256.0,
-    rotate_min: float = 60.0,
-    for_s: float | None = None,
-    json_: Annotated[bool, Parameter(name="--json")] = False,
+    options: Annotated[LogOptions, Parameter(name="*")] = LogOptions(),
 ) -> None:
     """Log the tracker until Ctrl-C: every position that it prints, in segments of which each is a whole recording.
 
@@ -104,41 +125,29 @@ def tracker(
         The rig file; [devices.tracker] states how the instrument is reached and what it prints.
     out
         Folder for segment-0001.mcap and those after it; nothing in it is overwritten.
-    rotate_mb
-        Size of a segment from which the next is begun.
-    rotate_min
-        Age of a segment, in minutes, from which the next is begun.
-    for_s
-        End by itself after so many seconds.
-    json_
-        Print one line of JSON at the end, and nothing else.
+    options
+        Of the length of the log and its segments.
 
     """
-    rotation = _rotation(rotate_mb, rotate_min)
+    rotation = options.rotation
     loaded = load_rig(rig)
     device = loaded.devices.tracker
     if device is None:
         raise DeviceRefused(f"rig {loaded.name}: no [devices.tracker]; add it, with how the tracker is reached")
-    _log(EncoderLog(device, rig_text(rig), out, SystemClock(), rotation, raw=False), out, for_s, json_=json_)
+    _log(EncoderLog(device, rig_text(rig), out, SystemClock(), rotation, raw=False), out, options)
 
 
-def _rotation(rotate_mb: float, rotate_min: float) -> Rotation:
-    if not (0.0 < rotate_mb < math.inf and 0.0 < rotate_min < math.inf):
-        raise DeviceRefused(f"--rotate-mb {rotate_mb:g}, --rotate-min {rotate_min:g}: give finite numbers above 0")
-    return Rotation(round(rotate_mb * MEGABYTE), 60.0 * rotate_min)
-
-
-def _log(job: EncoderLog, out: Path, for_s: float | None, *, json_: bool) -> None:
-    console = Console(quiet=json_)
+def _log(job: EncoderLog, out: Path, options: LogOptions) -> None:
+    console = Console(quiet=options.json_)
     try:
         with console.status("connecting", refresh_per_second=2.0) as status:
-            job.run(partial(_is_over, job, for_s, SystemClock()), lambda state: status.update(_now(state)))
+            job.run(partial(_is_over, job, options.for_s, SystemClock()), lambda state: status.update(_now(state)))
     except (DeviceError, RecordingError) as why:
         if job.state.rows == 0:
             raise
         raise PartialResult(f"{why}; rows kept in {out}: {job.state.rows}") from why
     console.print(_summary(job.state, job.segments), highlight=False)
-    if json_:
+    if options.json_:
         print(msgspec.json.encode(_as_json(job.state, job.segments)).decode())
 
 

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +12,15 @@ from acquisition.errors import AcquisitionError
 from acquisition.recording import RigFileError
 from acquisition.recording.files import brief
 from acquisition.recording.rig import Camera, Rig
-from acquisition.recording.rig.devices import EncoderDriver, OtherDevice, RobotDriver
+from acquisition.recording.rig.devices import (
+    EncoderDriver,
+    EncodersDevice,
+    OtherDevice,
+    PsdDevice,
+    RobotDevice,
+    RobotDriver,
+    TrackerDevice,
+)
 from acquisition.wires.attaching import one_error_tree
 from acquisition.wires.psd_view import psd_window
 from calibeam.devices.camera import camera_sight
@@ -37,7 +46,6 @@ from drivers.ur.reader import UrReader
 PICTURES = 3  # of the camera
 READ_S = 1.0  # host time that a device is listened to
 FIRST_SAMPLE_S = 1.0
-NAMES = ("psd", "tracker", "encoders", "robot")
 
 
 @dataclass(frozen=True)
@@ -62,26 +70,22 @@ class DeviceCheck:
 
 def check_devices(rig: Rig, clock: Clock) -> Iterator[DeviceCheck]:
     """One after the other, the arm stands still; devices that the rig does not name are left out."""
-    checks: dict[str, Callable[[Rig, Clock], DeviceCheck]] = {
-        "psd": _psd,
-        "tracker": _tracker,
-        "encoders": _encoders,
-        "robot": _robot,
-    }
-    for name in NAMES:
-        if getattr(rig.devices, name) is None:
-            continue
+    found, checks = rig.devices, list[tuple[str, Callable[[], DeviceCheck]]]()
+    if found.psd is not None:
+        checks.append(("psd", partial(_psd, found.psd, rig, clock)))
+    if found.tracker is not None:
+        checks.append(("tracker", partial(_tracker, found.tracker, clock)))
+    if found.encoders is not None:
+        checks.append(("encoders", partial(_encoders, found.encoders, clock)))
+    if found.robot is not None:
+        checks.append(("robot", partial(_robot, found.robot, rig, clock)))
+    checks += [(other.name, partial(_other, other, clock)) for other in found.others]
+    for name, check in checks:
         try:
             with one_error_tree(name, "checking"):
-                yield checks[name](rig, clock)
+                yield check()
         except DeviceError as error:
             yield DeviceCheck(name, wrong=str(error))
-    for other in rig.devices.others:
-        try:
-            with one_error_tree(other.name, "checking"):
-                yield _other(other, clock)
-        except DeviceError as error:
-            yield DeviceCheck(other.name, wrong=str(error))
     if rig.camera is not None:
         try:
             yield _camera(rig, rig.camera, clock)
@@ -113,9 +117,7 @@ def _camera(rig: Rig, camera: Camera, clock: Clock) -> DeviceCheck:
     return DeviceCheck("camera", what, rate_hz=rate_hz, noise=board)
 
 
-def _psd(rig: Rig, clock: Clock) -> DeviceCheck:
-    device = rig.devices.psd
-    assert device is not None  # noqa: S101 - asked by check_devices
+def _psd(device: PsdDevice, rig: Rig, clock: Clock) -> DeviceCheck:
     psd = psd_driver(device, rig, clock)
     with _listened(psd, clock) as blocks:
         identity = psd.identity
@@ -132,9 +134,7 @@ def _psd(rig: Rig, clock: Clock) -> DeviceCheck:
     return DeviceCheck("psd", what, "" if identity is None else identity.firmware, rate_hz, told, wrong)
 
 
-def _tracker(rig: Rig, clock: Clock) -> DeviceCheck:
-    device = rig.devices.tracker
-    assert device is not None  # noqa: S101 - asked by check_devices
+def _tracker(device: TrackerDevice, clock: Clock) -> DeviceCheck:
     tracker = tracker_driver(device, clock)
     with _listened(tracker, clock) as blocks:
         position_m = np.concatenate([block.values["position_m"] for block in blocks])
@@ -176,9 +176,7 @@ def _tracker_rate(blocks: Sequence[Block], wanted_hz: float) -> tuple[float, str
     return sample_rate([replace(block, device_s=block.host_s) for block in blocks], wanted_hz)
 
 
-def _encoders(rig: Rig, clock: Clock) -> DeviceCheck:
-    device = rig.devices.encoders
-    assert device is not None  # noqa: S101 - asked by check_devices
+def _encoders(device: EncodersDevice, clock: Clock) -> DeviceCheck:
     driver = encoder_driver(device, clock)
     with _listened(driver, clock) as blocks:
         q_rad = np.concatenate([block.values["position_rad"] for block in blocks])
@@ -197,9 +195,7 @@ def _encoders(rig: Rig, clock: Clock) -> DeviceCheck:
     return DeviceCheck("encoders", what, firmware, rate_hz, f"noise {1e6 * sample_noise(q_rad):.2f} µrad", wrong)
 
 
-def _robot(rig: Rig, clock: Clock) -> DeviceCheck:
-    device = rig.devices.robot
-    assert device is not None  # noqa: S101 - asked by check_devices
+def _robot(device: RobotDevice, rig: Rig, clock: Clock) -> DeviceCheck:
     robot = robot_of(device, clock)
     with _listened(robot.reader, clock) as blocks:
         q_rad = np.concatenate([block.values["actual_q_rad"] for block in blocks])

@@ -11,6 +11,7 @@ from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from dataclasses import dataclass
 
+from acquisition.wires.streams import in_thread
 from drivers.clock import Clock
 from drivers.errors import DeviceError
 
@@ -139,9 +140,8 @@ def watched_pages(stop: Stop, viewers: Viewers, limit_s: float | None, clock: Cl
     if limit_s is None:
         yield
         return
-    done = threading.Event()
 
-    def watch() -> None:
+    def watch(done: threading.Event) -> None:
         wait_s = LOOK_S
         while not done.wait(wait_s):
             wait_s = LOOK_S
@@ -150,10 +150,5 @@ def watched_pages(stop: Stop, viewers: Viewers, limit_s: float | None, clock: Cl
                     return
                 wait_s = AGAIN_S
 
-    watcher = threading.Thread(target=watch, name="watch live pages", daemon=True)
-    watcher.start()
-    try:
+    with in_thread(watch, "watch live pages"):
         yield
-    finally:
-        done.set()
-        watcher.join()

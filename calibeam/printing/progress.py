@@ -11,6 +11,7 @@ from contextlib import contextmanager
 
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
+from acquisition.wires.streams import in_thread
 from calibeam.console import Console
 from calibrate.diagnose.stages import Stage
 
@@ -78,24 +79,19 @@ def stages_shown(
     console: Console, samples: int, now_s: Callable[[], float] = time.monotonic
 ) -> Generator[Callable[[Stage], None]]:
     """Gives what a diagnosis calls when a stage begins."""
-    outlook, ended = Outlook(now_s(), samples), threading.Event()
+    outlook = Outlook(now_s(), samples)
     with console.status(outlook.text(now_s())) as status:
         every_s = TERMINAL_S if console.is_terminal else LINE_S
 
-        def show() -> None:
+        def show(ended: threading.Event) -> None:
             while not ended.wait(every_s):
                 if console.is_terminal:
                     status.update(outlook.text(now_s()))
                 else:
                     console.print(outlook.text(now_s()), markup=False, highlight=False)
 
-        showing = threading.Thread(target=show, name="progress", daemon=True)
-        showing.start()
-        try:
+        with in_thread(show, "progress"):
             yield lambda stage: outlook.enter(stage, now_s())
-        finally:
-            ended.set()
-            showing.join()
 
 
 def _share_before(stage: Stage) -> float:

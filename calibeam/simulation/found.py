@@ -153,6 +153,11 @@ class FoundEffect:
         return next(self.sizes[name] for name in names if name in self.sizes)
 
     @property
+    def at_s(self) -> float:
+        """Its moment on the session's clock."""
+        return self.size("time_s") - self.session.start_s
+
+    @property
     def thermometer(self) -> str:
         """Where its temperature is taken; "" for what follows no temperature."""
         return self.driver.removeprefix("temp_") if self.driver.startswith("temp_") else ""

@@ -14,43 +14,40 @@ from calibrate.model.effects.time_laws import FOR_A_WHILE
 from simulators.arm.rigid import Vector
 from simulators.arm.statics import Load, Weight, carried_by, loaded_by
 from simulators.defects import Defect
+from simulators.defects.base import CarriedBase
 from simulators.defects.defect import as_vector
 from simulators.defects.displacement import CarriedPart, Course
 from simulators.defects.drive import (
     GearRunout,
-    HardeningSpring,
     PayloadOnSoftJoint,
     PressedJoint,
-    SlackUnderWeight,
     TwoSlopeFlexspline,
 )
-from simulators.defects.encoder import RADIUS_M, EccentricDisc, EncoderSlip, OvalRing
+from simulators.defects.encoder import OvalRing
 from simulators.defects.fixture import CarriedCones, CarriedFixture, CarriedTable, MovedCone
-from simulators.defects.link import FlatLink, HeatedLink, LaggingLink, WarmingUp, WornBearing, cantilever
+from simulators.defects.link import FlatLink, WornBearing, cantilever
 from simulators.defects.tracker import CarriedDevice
 
 Floats = NDArray[np.float64]
 WHEEL_M = 0.05  # pitch radius of the wheel of a simulated gear; only runout over radius shows
 FRICTION_WIDTH = 1.4  # of the smooth turn-over's torque: a straight turn-over that differs from it least
-LEAST = 1e-9  # of a share or a stiffness that another quantity is divided by
+LEAST = 1e-12  # of a size or a stiffness that another quantity is divided by
 PARALLEL = 0.1  # sine between a link and the next joint's axis
 NOWHERE: Vector = (0.0, 0.0, 0.0)
+ZERO = np.zeros(3)
+
+
+def size_and_direction(values: Floats) -> tuple[float, Floats]:
+    size = max(float(np.linalg.norm(values)), LEAST)
+    return size, values / size
 
 
 # --- joints
 
 
-def make_eccentric(f: FoundEffect) -> Defect:
-    return EccentricDisc(f.number, f.size("amplitude_rad") * RADIUS_M, -f.size("phase_rad"))
-
-
 def make_ring(f: FoundEffect) -> Defect:
     lobes = f.term.order or 2
     return OvalRing(f.number, lobes * f.size("amplitude_rad"), -(f.size("phase_rad") + math.pi) / lobes, lobes)
-
-
-def make_runout(f: FoundEffect) -> Defect:
-    return GearRunout(f.number, f.size("amplitude_rad") * WHEEL_M, f.size("order_per_turn"), 0.0, -f.size("phase_rad"))
 
 
 def make_of_unknown_period(f: FoundEffect) -> Defect:
@@ -60,38 +57,27 @@ def make_of_unknown_period(f: FoundEffect) -> Defect:
 
 
 def make_two_slopes(f: FoundEffect) -> Defect:
-    below = max(f.size("compliance_rad_nm"), LEAST * 1e-3)
+    below = max(f.size("compliance_rad_nm"), LEAST)
     return TwoSlopeFlexspline(f.number, below, f.size("compliance_above_rad_nm") / below, f.size("knee_nm"))
 
 
-def make_hardening(f: FoundEffect) -> Defect:
-    change = f.size("compliance_change_rad_nm") / f.largest_nm**2
-    return HardeningSpring(f.number, f.size("compliance_at_rest_rad_nm"), change)
-
-
 def make_pressed(f: FoundEffect) -> Defect:
-    push = FORCE_N * f.coefficients
-    size = max(float(np.linalg.norm(f.coefficients)), LEAST * 1e-3)
+    size, along = size_and_direction(f.coefficients)
     point = f.session.predictor.rig.tool.point_m or NOWHERE
-    return PressedJoint(f.number, size, as_vector(push / size), point)
+    return PressedJoint(f.number, size, as_vector(FORCE_N * along), point)
 
 
 def make_payload(f: FoundEffect) -> Defect:
     if len(f.coefficients) == 1:
         return PayloadOnSoftJoint(f.number, f.size("compliance_rad_nm"))
     soft = float(f.coefficients[0])
-    soft = soft if abs(soft) > LEAST * 1e-3 else LEAST * 1e-3
+    soft = soft if abs(soft) > LEAST else LEAST
     return PayloadOnSoftJoint(f.number, soft, as_vector(f.coefficients[1:] / soft))
 
 
-def make_under_weight(f: FoundEffect) -> Defect:
+def friction_nm(f: FoundEffect) -> float:
     known = "turning_torque_nm" in f.sizes
-    turns_nm = f.size("turning_torque_nm") if known else f.size("turning_torque_share") * f.largest_nm
-    return SlackUnderWeight(f.number, f.size("play_rad"), FRICTION_WIDTH * turns_nm)
-
-
-def make_slip(f: FoundEffect) -> Defect:
-    return EncoderSlip(f.number, -f.size("slip_rad"), f.size("time_s") - f.session.start_s)
+    return FRICTION_WIDTH * (f.size("turning_torque_nm") if known else f.size("turning_torque_share") * f.largest_nm)
 
 
 # --- links and base
@@ -118,29 +104,31 @@ def make_flat(f: FoundEffect) -> Defect:
     return FlatLink(f.number, u, v, as_vector(across / np.linalg.norm(across)))
 
 
-def make_heated(f: FoundEffect) -> Defect:
-    return HeatedLink(f.number, f.size("expansion_per_k"), f.thermometer)
-
-
-def make_lagging(f: FoundEffect) -> Defect:
-    return LaggingLink(f.number, f.size("expansion_per_k"), f.thermometer, f.size("lag_s"))
-
-
-def make_warming(f: FoundEffect, first: int, last: int) -> Defect:
-    return WarmingUp(first, last, f.size("growth_share"), f.size("time_constant_s"))
-
-
 def course_of(f: FoundEffect) -> tuple[Course, float, float]:
     """Course, moment and duration on the session's clock."""
     if f.thermometer:
         return "warmth", 0.0, 1.0
     if f.term.shape is Shape.STEP and "until_s" in f.sizes:
-        return "while", f.size("time_s") - f.session.start_s, f.size("until_s") - f.size("time_s")
+        return "while", f.at_s, f.size("until_s") - f.size("time_s")
     if f.term.shape is Shape.STEP:
-        return "step", f.size("time_s") - f.session.start_s, 1.0
+        return "step", f.at_s, 1.0
     if f.term.shape is Shape.EXPONENTIAL:
         return "settling", 0.0, f.size("time_constant_s")
     return "steady", 0.0, f.session.length_s
+
+
+def displaced(
+    f: FoundEffect,
+    kind: type[CarriedPart],
+    shift_m: Floats,
+    turn_rad: Floats = ZERO,
+    about_m: Floats = ZERO,
+    **more: float,
+) -> Defect:
+    """A part that goes this way in the course of the effect."""
+    course, at_s, over_s = course_of(f)
+    way = as_vector(shift_m), as_vector(turn_rad), as_vector(about_m)
+    return kind(*way, course, at_s, over_s, f.thermometer, **more)
 
 
 def carried(f: FoundEffect, pose: Floats, sense: float, kind: type[CarriedPart], **more: float) -> Defect:
@@ -148,10 +136,12 @@ def carried(f: FoundEffect, pose: Floats, sense: float, kind: type[CarriedPart],
     turn = pose[:3, :3].T
     six = np.zeros(6)
     six[: len(f.coefficients)] = sense * f.coefficients
-    course, at_s, over_s = course_of(f)
-    about = f.session.own(pose, f.session.middle_m)
-    shift, spin = as_vector(turn @ six[:3]), as_vector(turn @ six[3:])
-    return kind(shift, spin, as_vector(about), course, at_s, over_s, f.thermometer, **more)
+    return displaced(f, kind, turn @ six[:3], turn @ six[3:], f.session.own(pose, f.session.middle_m), **more)
+
+
+def make_base(f: FoundEffect) -> Defect:
+    """The effect moves what stands around the arm."""
+    return carried(f, np.eye(4), -1.0, CarriedBase)
 
 
 def make_device(f: FoundEffect) -> Defect:
@@ -182,9 +172,8 @@ def make_cones(f: FoundEffect) -> Defect:
 
 
 def make_cone(f: FoundEffect) -> Defect:
-    size = max(float(np.linalg.norm(f.coefficients)), LEAST * 1e-3)
-    cone, at_s = int(f.variant.removeprefix("seat ")), f.size("time_s") - f.session.start_s
-    return MovedCone(cone, size, as_vector(f.coefficients / size), at_s)
+    size, along = size_and_direction(f.coefficients)
+    return MovedCone(int(f.variant.removeprefix("seat ")), size, as_vector(along), f.at_s)
 
 
 # --- weights that load a spring as was found, where masses are not known or were corrected

@@ -1,31 +1,42 @@
 """Makes the mechanisms of tool, laser, detectors and devices from what was found, and those that have no name."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
 
 from calibeam.simulation.found import FoundEffect
-from calibeam.simulation.of_arm import course_of
-from calibrate.model.effects.laser_pointing import beam_axes
-from calibrate.model.effects.ports import Place
-from calibrate.model.effects.since_model import line_of
-from calibrate.model.effects.tool_sag import PAIRS
-from calibrate.model.sensors.catalogue import kind_of
-from calibrate.model.sensors.kind import Trait
+from calibeam.simulation.of_arm import NOWHERE, displaced, size_and_direction
+from calibrate.model.effects.laser_pointing import (
+    beam_axes,
+)
+from calibrate.model.effects.ports import (
+    Place,
+)
+from calibrate.model.effects.since_model import (
+    line_of,
+)
+from calibrate.model.effects.tool_sag import (
+    PAIRS,
+)
+from calibrate.model.sensors.catalogue import (
+    kind_of,
+)
+from calibrate.model.sensors.kind import (
+    Trait,
+)
 from simulators.arm.drawing import origin_and_rotation
 from simulators.arm.rigid import Vector
 from simulators.defects import Defect
 from simulators.defects.defect import as_vector
-from simulators.defects.detector import StrainedFace, StrayLight, UnevenLayer, WavesOnFace
+from simulators.defects.detector import StrainedFace, StrayLight, WavesOnFace
 from simulators.defects.found_curve import CurveAtBase, CurveAtJoints, CurveAtLink, CurveInReading
 from simulators.defects.tool import CarriedLaser, CarriedTarget, ElasticMount, LaserWarmUp, SaggingMount, WarmLaser
-from simulators.defects.tracker import CircleOffCentre, DrumOutOfRound, TrackerScale, WireScale
+from simulators.defects.tracker import DrumOutOfRound, TrackerScale, WireScale
 
 Floats = NDArray[np.float64]
-LEAST = 1e-9  # of a share or a stiffness that another quantity is divided by
-NOWHERE: Vector = (0.0, 0.0, 0.0)
+LEAST = 1e-9  # of a share of foreign light, which the place of it is divided by
 
 
 # --- tool and laser
@@ -71,8 +82,8 @@ def across(f: FoundEffect) -> tuple[float, Vector, Vector]:
     """Size, direction and origin of what happens along two axes across the beam."""
     origin, u, v = beam_axes(f.session.drivers)
     both = f.coefficients[0] * u + f.coefficients[1] * v
-    size = max(float(np.linalg.norm(both)), LEAST * 1e-3)
-    return size, as_vector(both / size), as_vector(origin)
+    size, along = size_and_direction(both)
+    return size, as_vector(along), as_vector(origin)
 
 
 def make_pointing(f: FoundEffect) -> Defect:
@@ -84,30 +95,21 @@ def make_pointing(f: FoundEffect) -> Defect:
 
 def make_walking(f: FoundEffect) -> Defect:
     size, along, _ = across(f)
-    course, at_s, over_s = course_of(f)
-    shift = as_vector(size * np.array(along))
-    return CarriedLaser(shift, NOWHERE, NOWHERE, course, at_s, over_s, f.thermometer)
+    return displaced(f, CarriedLaser, size * np.array(along))
 
 
 def make_target(f: FoundEffect) -> Defect:
-    course, at_s, over_s = course_of(f)
-    return CarriedTarget(as_vector(f.coefficients), NOWHERE, NOWHERE, course, at_s, over_s)
+    return displaced(f, CarriedTarget, f.coefficients)
 
 
 def make_moved_laser(f: FoundEffect) -> Defect:
     """Two small turns and shifts of one body add up; the turns are about the origin of the beam."""
     twist = line_of(f.session.drivers) @ f.coefficients
     origin = np.array(f.session.predictor.rig.tool.laser_origin_m or NOWHERE)
-    course, at_s, over_s = course_of(f)
-    shift = twist[:3] + np.cross(twist[3:], origin)
-    return CarriedLaser(as_vector(shift), as_vector(twist[3:]), as_vector(origin), course, at_s, over_s)
+    return displaced(f, CarriedLaser, twist[:3] + np.cross(twist[3:], origin), twist[3:], origin)
 
 
 # --- detectors
-
-
-def half_m(f: FoundEffect) -> float:
-    return f.session.light.half_size_m
 
 
 def make_strained(f: FoundEffect) -> Defect:
@@ -115,14 +117,13 @@ def make_strained(f: FoundEffect) -> Defect:
     return StrainedFace(f.number, x, y, f.sizes.get("cross_share", 0.0))
 
 
-def layer(f: FoundEffect, powers: Sequence[tuple[int, int, int]]) -> Defect:
-    """`powers`: axis, i, j of each coefficient, in order."""
-    sizes = tuple((a, i, j, float(c)) for (a, i, j), c in zip(powers, f.coefficients, strict=True))
-    return UnevenLayer(f.number, sizes, half_m(f))
+def powers(*of_place: tuple[int, int, int]) -> Callable[[FoundEffect], tuple[tuple[int, int, int, float], ...]]:
+    """`of_place`: axis and the powers of x and y of each coefficient, in order."""
+    return lambda f: tuple((*one, float(c)) for one, c in zip(of_place, f.coefficients, strict=True))
 
 
-SQUARES = ((2, 0), (1, 1), (0, 2))
-CUBES = ((3, 0), (2, 1), (1, 2), (0, 3))
+SQUARES = [(axis, *of_x_y) for axis in (0, 1) for of_x_y in ((2, 0), (1, 1), (0, 2))]
+CUBES = [(axis, *of_x_y) for axis in (0, 1) for of_x_y in ((3, 0), (2, 1), (1, 2), (0, 3))]
 
 
 def make_waves(f: FoundEffect) -> Defect:
@@ -155,11 +156,6 @@ def make_drum(f: FoundEffect) -> Defect:
     radius_m = f.size("period_m") / (2.0 * math.pi)
     bearing_rad = f.size("phase_rad") + math.pi
     return DrumOutOfRound(f.size("amplitude_m"), radius_m, bearing_rad, -bearing_rad * radius_m)
-
-
-def make_circle(f: FoundEffect) -> Defect:
-    which = "azimuth" if f.variant == "azimuth" else "elevation"
-    return CircleOffCentre(which, f.term.order or 1, f.size("amplitude_rad"), f.size("phase_rad"))
 
 
 # --- what has no name

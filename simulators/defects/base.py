@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simulators.arm.rigid import turned
-from simulators.arm.statics import Load, Weight, carried_by, loaded_by
-from simulators.defects.defect import ANY_INSTRUMENT, ROBOT, Defect
+from simulators.arm.statics import Load
+from simulators.defects.defect import ANY_INSTRUMENT, ROBOT, Defect, UnderWeights
 from simulators.defects.displacement import BriefShift, Bump, CarriedPart, Displacement, Settling
 from simulators.defects.scene import Scene, Site
 
@@ -95,22 +95,14 @@ class UnevenPedestal(_Pedestal):
 
 
 @dataclass(frozen=True)
-class PedestalUnderWeights(_Pedestal):
-    """A soft pedestal under weights that are none of the stated masses, each times its compliance (see `Weight`).
-
-    To the payload, whose mass is known, it yields `payload_rad_nm`.
-    """
-
-    weights: tuple[Weight, ...]
-    payload_rad_nm: float = 0.0
-    share: float = 1.0
+class PedestalUnderWeights(UnderWeights, _Pedestal):
+    """A soft pedestal under other weights than the stated masses."""
 
     KIND = "pedestal-under-weights"
 
     def base_motion(self, scene: Scene, load: Load) -> Floats:
-        own, _ = loaded_by(load, self.weights, 0)
-        payload, _ = carried_by(load, self.payload_rad_nm * scene.payload_kg, scene.payload_com_m, 0)
-        return turned(self.share * (own + payload) * np.array([1.0, 1.0, 0.0]))
+        moment, _ = self.felt(scene, load, 0)
+        return turned(self.share * moment * np.array([1.0, 1.0, 0.0]))
 
 
 @dataclass(frozen=True)

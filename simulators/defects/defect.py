@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simulators.arm.rigid import Vector
-from simulators.arm.statics import Load
+from simulators.arm.statics import Load, Weight, carried_by, loaded_by
 from simulators.defects.scene import Light, Scene, Site
 
 Floats = NDArray[np.float64]
@@ -31,7 +31,8 @@ class Mechanism:
     PHYSICS: ClassVar[str]  # as in the interchange format; UNKNOWN when no catalogue has it
     PORT: ClassVar[str]  # where it sits: "joint{joint}.angle", as in the interchange format
     DRIVERS: ClassVar[tuple[str, ...]]  # what it depends on: "q{joint}", as in the interchange format
-    FIGURES: ClassVar[tuple[str, ...]] = ()  # fields that a diagnosis states under the same names
+    EVERY_JOINT: ClassVar[str] = ""  # in place of DRIVERS: "qd", where it depends on that of all its `joints`
+    FIGURES: ClassVar[tuple[str, ...]] = ()  # fields that a diagnosis states; "its name=field" where the names differ
     ALSO: ClassVar[tuple[str, ...]] = ()  # physics that is truly at this port, too, as a part of the mechanism
 
     @property
@@ -40,12 +41,15 @@ class Mechanism:
 
     @property
     def drivers(self) -> tuple[str, ...]:
+        if self.EVERY_JOINT:
+            return tuple(f"{self.EVERY_JOINT}{joint}" for joint in range(1, vars(self)["joints"] + 1))
         return tuple(driver.format_map(vars(self)) for driver in self.DRIVERS)
 
     @property
     def figures(self) -> Mapping[str, float]:
         """Its size in the words of a diagnosis, e.g. `amplitude_rad`; empty when there is no single number."""
-        return {name: float(getattr(self, name)) for name in self.FIGURES}
+        named = (figure.partition("=") for figure in self.FIGURES)
+        return {name: float(getattr(self, field or name)) for name, _, field in named}
 
 
 @dataclass(frozen=True)
@@ -94,6 +98,24 @@ def with_size(defect: AnyDefect, size: float) -> AnyDefect:
 def size_of(defect: Defect) -> float:
     """The value of the field that scales the mechanism."""
     return float(getattr(defect, defect.SIZE))
+
+
+@dataclass(frozen=True)
+class UnderWeights(Defect):
+    """A part that yields to weights that are none of the stated masses, each times its compliance (see `Weight`).
+
+    To the payload, whose mass is known, it yields `payload_rad_nm`.
+    """
+
+    weights: tuple[Weight, ...]
+    payload_rad_nm: float = 0.0
+    share: float = 1.0
+
+    def felt(self, scene: Scene, load: Load, link: int, first: int = 0) -> tuple[Floats, Floats]:
+        """Moment about the start of link `link` and force, (row, 3), of the bodies from `first` on and the payload."""
+        own = loaded_by(load, [weight for weight in self.weights if weight.body >= first], link)
+        payload = carried_by(load, self.payload_rad_nm * scene.payload_kg, scene.payload_com_m, link)
+        return own[0] + payload[0], own[1] + payload[1]
 
 
 # --- drawing

@@ -53,10 +53,7 @@ class Pincushion(PsdDefect):
     PHYSICS = "psd-nonlinearity"
     SIZE = "distortion"
     TYPICAL = 3e-3
-
-    @property
-    def figures(self) -> dict[str, float]:
-        return {"edge_share": self.distortion}
+    FIGURES = ("edge_share=distortion",)
 
     @classmethod
     def draw(cls, rng: np.random.Generator, site: Site) -> Self:
@@ -83,10 +80,7 @@ class BowedScale(PsdDefect):
     PHYSICS = "psd-nonlinearity"
     SIZE = "bow"
     TYPICAL = 3e-3
-
-    @property
-    def figures(self) -> dict[str, float]:
-        return {"quadratic": self.bow}
+    FIGURES = ("quadratic=bow",)
 
     @classmethod
     def draw(cls, rng: np.random.Generator, site: Site) -> Self:
@@ -135,10 +129,7 @@ class SkewedElectrodes(PsdDefect):
     PHYSICS = "psd-gain"
     SIZE = "skew"
     TYPICAL = 2e-3
-
-    @property
-    def figures(self) -> dict[str, float]:
-        return {"cross": self.skew}
+    FIGURES = ("cross=skew",)
 
     @classmethod
     def draw(cls, rng: np.random.Generator, site: Site) -> Self:

@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 
 from simulators.arm.kinematics import forward
 from simulators.arm.rigid import Vector
-from simulators.arm.statics import Load, Weight, carried_by, loaded_by, weigh
-from simulators.defects.defect import ROBOT, Defect, as_vector, direction, phase
+from simulators.arm.statics import Load, weigh
+from simulators.defects.defect import ROBOT, Defect, UnderWeights, as_vector, direction, phase
 from simulators.defects.scene import Scene, Site, UnsuitedError
 
 Floats = NDArray[np.float64]
@@ -89,10 +89,7 @@ class WrongRatio(DriveDefect):
     PHYSICS = "gear-ratio-error"
     SIZE = "excess"
     TYPICAL = 1e-4
-
-    @property
-    def figures(self) -> dict[str, float]:
-        return {"scale_error_rad_per_rad": self.excess}
+    FIGURES = ("scale_error_rad_per_rad=excess",)
 
     @classmethod
     def draw(cls, rng: np.random.Generator, site: Site) -> Self:
@@ -117,10 +114,7 @@ class CoupledWrist(DriveDefect):
     PHYSICS = "joint-coupling"
     DRIVERS = ("q{other}",)
     TYPICAL = 1e-4
-
-    @property
-    def figures(self) -> dict[str, float]:
-        return {"coupling_rad_per_rad": self.share}
+    FIGURES = ("coupling_rad_per_rad=share",)
 
     @classmethod
     def draw(cls, rng: np.random.Generator, site: Site) -> Self:
@@ -409,24 +403,16 @@ class HardeningSpring(DriveDefect):
 
 
 @dataclass(frozen=True)
-class SpringUnderWeights(DriveDefect):
-    """A soft joint whose load is none of the stated masses: each weight is a mass times the spring's compliance.
-
-    To the payload, whose mass is known, it yields `payload_rad_nm`.
-    """
-
-    weights: tuple[Weight, ...]
-    payload_rad_nm: float = 0.0
-    share: float = 1.0
+class SpringUnderWeights(UnderWeights, DriveDefect):
+    """A soft joint under other weights than the stated masses."""
 
     KIND = "spring-under-weights"
     PHYSICS = "joint-compliance"
     DRIVERS = ("gravity_torque{joint}",)
 
     def turn_rad(self, shaft_rad: Floats, scene: Scene, load: Load) -> Floats:
-        own, _ = loaded_by(load, self.weights, self.joint)
-        payload, _ = carried_by(load, self.payload_rad_nm * scene.payload_kg, scene.payload_com_m, self.joint)
-        return self.share * (own + payload)[:, 2]
+        moment, _ = self.felt(scene, load, self.joint)
+        return self.share * moment[:, 2]
 
 
 @dataclass(frozen=True)
@@ -470,18 +456,12 @@ class Unsettled(Defect):
     KIND = "unsettled"
     PHYSICS = "not-settled"
     PORT = "time"
+    EVERY_JOINT = "last_move"
     SIZE = "left"
     TYPICAL = 1e-5
     INSTRUMENTS = ROBOT
     HABIT = "direct"
-
-    @property
-    def drivers(self) -> tuple[str, ...]:
-        return tuple(f"last_move{joint}" for joint in range(1, self.joints + 1))
-
-    @property
-    def figures(self) -> dict[str, float]:
-        return {"left_share": self.left}
+    FIGURES = ("left_share=left",)
 
     @classmethod
     def draw(cls, rng: np.random.Generator, site: Site) -> Self:
@@ -501,19 +481,13 @@ class LateClock(Defect):
     KIND = "late-clock"
     PHYSICS = "latency"
     PORT = "time"
+    EVERY_JOINT = "qd"
     SIZE = "late_s"
     TYPICAL = 2e-3
     INSTRUMENTS = ROBOT
     HABIT = "moving"
     NEEDS = ("qd",)
-
-    @property
-    def drivers(self) -> tuple[str, ...]:
-        return tuple(f"qd{joint}" for joint in range(1, self.joints + 1))
-
-    @property
-    def figures(self) -> dict[str, float]:
-        return {"delay_s": self.late_s}
+    FIGURES = ("delay_s=late_s",)
 
     @classmethod
     def draw(cls, rng: np.random.Generator, site: Site) -> Self:

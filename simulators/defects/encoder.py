@@ -36,6 +36,22 @@ class EncoderDefect(Defect):
         return error_rad
 
 
+class ControllerEncoderDefect(EncoderDefect):
+    """Of the encoder that the controller reads."""
+
+    def reading_error_rad(self, shaft_rad: Floats, scene: Scene) -> Floats:
+        return self.in_column_rad(shaft_rad, scene)
+
+
+class SecondEncoderDefect(EncoderDefect):
+    """Of a second encoder: the controller's own reading is right, and so is the arm."""
+
+    INSTRUMENTS = ()  # no instrument at the flange shows it
+
+    def second_error_rad(self, shaft_rad: Floats, scene: Scene) -> Floats:
+        return self.in_column_rad(shaft_rad, scene)
+
+
 @dataclass(frozen=True)
 class Disc(EncoderDefect):
     """A disc `eccentricity_m` off its shaft, read by one head.
@@ -68,28 +84,21 @@ class Disc(EncoderDefect):
 
 
 @dataclass(frozen=True)
-class EccentricDisc(Disc):
-    """Of the encoder that the controller reads."""
+class EccentricDisc(Disc, ControllerEncoderDefect):
+    """The disc of the encoder that the controller reads."""
 
     KIND = "encoder-eccentricity"
 
-    def reading_error_rad(self, shaft_rad: Floats, scene: Scene) -> Floats:
-        return self.in_column_rad(shaft_rad, scene)
-
 
 @dataclass(frozen=True)
-class SecondDisc(Disc):
-    """Of a second encoder: the controller's own reading is right, and so is the arm."""
+class SecondDisc(Disc, SecondEncoderDefect):
+    """The disc of a second encoder."""
 
     KIND = "second-encoder-eccentricity"
-    INSTRUMENTS = ()  # no instrument at the flange shows it
-
-    def second_error_rad(self, shaft_rad: Floats, scene: Scene) -> Floats:
-        return self.in_column_rad(shaft_rad, scene)
 
 
 @dataclass(frozen=True)
-class OvalRing(EncoderDefect):
+class OvalRing(ControllerEncoderDefect):
     """A ring that was pressed oval by `ovality` (largest radius over mean radius, less 1), read by one head.
 
     Radius r (1 + k cos 2(q - b)); marks keep their distance along the rim, so the angle per mark grows where the rim
@@ -114,9 +123,6 @@ class OvalRing(EncoderDefect):
     @classmethod
     def draw(cls, rng: np.random.Generator, site: Site) -> Self:
         return cls(site.any_joint(rng), cls.draw_size(rng), phase(rng))
-
-    def reading_error_rad(self, shaft_rad: Floats, scene: Scene) -> Floats:
-        return self.in_column_rad(shaft_rad, scene)
 
     def error_rad(self, shaft_rad: Floats, scene: Scene) -> Floats:
         turn_rad = shaft_rad[:, self.joint - 1] - self.bearing_rad
@@ -146,18 +152,15 @@ class Slip(EncoderDefect):
     DRIVERS = ("t",)
     SIZE = "slip_rad"
     TYPICAL = 1e-4
-
-    @property
-    def figures(self) -> dict[str, float]:
-        return {"at_s": self.at_s, "step_rad": self.slip_rad}
+    FIGURES = ("at_s", "step_rad=slip_rad")
 
     def error_rad(self, shaft_rad: Floats, scene: Scene) -> Floats:
         return np.where(scene.t_s >= self.at_s, self.slip_rad, 0.0)
 
 
 @dataclass(frozen=True)
-class EncoderSlip(Slip):
-    """Of the encoder that the controller reads."""
+class EncoderSlip(Slip, ControllerEncoderDefect):
+    """The coupling of the encoder that the controller reads."""
 
     KIND = "encoder-slip"
 
@@ -165,16 +168,12 @@ class EncoderSlip(Slip):
     def draw(cls, rng: np.random.Generator, site: Site) -> Self:
         return cls(site.any_joint(rng), cls.draw_signed(rng), site.middle_s(rng))
 
-    def reading_error_rad(self, shaft_rad: Floats, scene: Scene) -> Floats:
-        return self.in_column_rad(shaft_rad, scene)
-
 
 @dataclass(frozen=True)
-class SecondSlip(Slip):
-    """Of a second encoder: the controller's own reading is right, and so is the arm."""
+class SecondSlip(Slip, SecondEncoderDefect):
+    """The coupling of a second encoder."""
 
     KIND = "second-encoder-slip"
-    INSTRUMENTS = ()  # no instrument at the flange shows it
 
     @classmethod
     def draw(cls, rng: np.random.Generator, site: Site) -> Self:
@@ -182,12 +181,9 @@ class SecondSlip(Slip):
         at_s = site.middle_s(rng)
         return cls(site.any_joint(rng), cls.draw_size(rng) * sign, at_s)
 
-    def second_error_rad(self, shaft_rad: Floats, scene: Scene) -> Floats:
-        return self.in_column_rad(shaft_rad, scene)
-
 
 @dataclass(frozen=True)
-class SlowFilter(EncoderDefect):
+class SlowFilter(ControllerEncoderDefect):
     """A filter between encoder and controller: `missing` of the last move is still to go when it is read (no unit).
 
     First-order lag with time constant T after a ramp of duration D at constant speed: what is missing is
@@ -203,24 +199,18 @@ class SlowFilter(EncoderDefect):
     TYPICAL = 3e-5
     INSTRUMENTS = ROBOT
     HABIT = "direct"
-
-    @property
-    def figures(self) -> dict[str, float]:
-        return {"slope": self.missing}
+    FIGURES = ("slope=missing",)
 
     @classmethod
     def draw(cls, rng: np.random.Generator, site: Site) -> Self:
         return cls(site.any_joint(rng), cls.draw_size(rng))
-
-    def reading_error_rad(self, shaft_rad: Floats, scene: Scene) -> Floats:
-        return self.in_column_rad(shaft_rad, scene)
 
     def error_rad(self, shaft_rad: Floats, scene: Scene) -> Floats:
         return -self.missing * scene.last_move_rad[:, self.joint - 1]
 
 
 @dataclass(frozen=True)
-class StaleReading(EncoderDefect):
+class StaleReading(ControllerEncoderDefect):
     """A controller that reports an older angle than the one it has: `missing` of what it still asks for (no unit).
 
     A first-order lag in a position loop at constant speed reads behind by a share of the following error.
@@ -234,9 +224,6 @@ class StaleReading(EncoderDefect):
     SIZE = "missing"
     TYPICAL = 0.1
     INSTRUMENTS = ROBOT
-
-    def reading_error_rad(self, shaft_rad: Floats, scene: Scene) -> Floats:
-        return self.in_column_rad(shaft_rad, scene)
 
     def error_rad(self, shaft_rad: Floats, scene: Scene) -> Floats:
         if scene.asked_rad is None:

@@ -6,52 +6,42 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from simulators.arm.rigid import Vector, moved
+from simulators.arm.rigid import Vector
 from simulators.defects.defect import SPOTS, Defect, direction
-from simulators.defects.displacement import Bump, CarriedPart
+from simulators.defects.displacement import BriefShift, Bump, CarriedPart
 from simulators.defects.scene import Scene, Site
 
 Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class BumpedFixture(Defect):
+class BumpedFixture(BriefShift):
     """A fixture that was knocked at a place: it moves by `shift_m` at `at_s`, until it leaves that place.
 
     It also turns about `turn_rad_m` for each metre.
     """
 
     place: int
-    shift_m: float
-    along: Vector
-    turn_rad_m: float
-    about: Vector
-    at_s: float
-    until_s: float
 
     KIND = "bumped-fixture"
     PHYSICS = "fixture-moved"
     PORT = "fixture.pose"
-    DRIVERS = ("t",)
-    SIZE = "shift_m"
     TYPICAL = 3e-5
+    TURNS_RAD_M = (0.0, 3.0)
     INSTRUMENTS = SPOTS
-
-    @property
-    def figures(self) -> dict[str, float]:
-        return {"at_s": self.at_s, "placement": float(self.place), "shift_m": self.shift_m}
+    FIGURES = ("at_s", "placement=place", "shift_m")
 
     @classmethod
     def draw(cls, rng: np.random.Generator, site: Site) -> Self:
         place = int(rng.choice(site.places))
         at_s, until_s = site.stay_s(place, rng)
-        way = cls.draw_size(rng), direction(rng), float(rng.uniform(0.0, 3.0)), direction(rng)
-        return cls(place, *way, at_s, until_s)
+        return cls(*cls._draw_way(rng), at_s, until_s, place)
+
+    def gone_m(self, scene: Scene) -> Floats:
+        return np.where(scene.placement == self.place, super().gone_m(scene), 0.0)
 
     def fixture_motion(self, scene: Scene) -> Floats:
-        knocked = (scene.placement == self.place) & (scene.t_s >= self.at_s) & (scene.t_s < self.until_s)
-        far_m = np.where(knocked, self.shift_m, 0.0)[:, np.newaxis]
-        return moved(far_m * np.asarray(self.along), self.turn_rad_m * far_m * np.asarray(self.about))
+        return self.motion(scene)
 
 
 @dataclass(frozen=True)
@@ -70,10 +60,7 @@ class MovedCone(Defect):
     SIZE = "shift_m"
     TYPICAL = 4e-5
     INSTRUMENTS = ("seat",)
-
-    @property
-    def figures(self) -> dict[str, float]:
-        return {"at_s": self.at_s, "seat": float(self.cone), "shift_m": self.shift_m}
+    FIGURES = ("at_s", "seat=cone", "shift_m")
 
     @classmethod
     def draw(cls, rng: np.random.Generator, site: Site) -> Self:

@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simulators.arm.rigid import Vector, shifted, turned, turned_about
-from simulators.arm.statics import Load, Weight, carried_by, loaded_by
-from simulators.defects.defect import ANY_INSTRUMENT, ROBOT, Defect, phase
+from simulators.arm.statics import Load
+from simulators.defects.defect import ANY_INSTRUMENT, ROBOT, Defect, UnderWeights, phase
 from simulators.defects.scene import Scene, Site
 
 Floats = NDArray[np.float64]
@@ -102,23 +102,13 @@ class FlatLink(_LoadedLink):
 
 
 @dataclass(frozen=True)
-class BeamUnderWeights(_LoadedLink):
-    """A clamped beam under weights that are none of the stated masses, each times L / (E I) (see `Weight`).
-
-    To the payload, whose mass is known, it yields with the slope `payload_rad_nm` for a moment at its end.
-    """
-
-    weights: tuple[Weight, ...]
-    payload_rad_nm: float = 0.0
-    share: float = 1.0
+class BeamUnderWeights(UnderWeights, _LoadedLink):
+    """A clamped beam under other weights than the stated masses; its compliance is L / (E I), a slope for a moment."""
 
     KIND = "beam-under-weights"
 
     def link_motion(self, link: int, end_m: Floats, angle_rad: Floats, scene: Scene, load: Load) -> Floats:
-        beyond = tuple(weight for weight in self.weights if weight.body > link)
-        own = loaded_by(load, beyond, link)
-        payload = carried_by(load, self.payload_rad_nm * scene.payload_kg, scene.payload_com_m, link)
-        sag_m, slope_rad = cantilever(end_m, own[0] + payload[0], own[1] + payload[1])
+        sag_m, slope_rad = cantilever(end_m, *self.felt(scene, load, link, first=link + 1))
         share = self.share / float(np.linalg.norm(end_m))
         return shifted(share * sag_m) @ turned_about(end_m, share * slope_rad)
 
@@ -214,10 +204,7 @@ class LaggingLink(HeatedLink):
     time_constant_s: float = 1800.0
 
     KIND = "lagging-link"
-
-    @property
-    def figures(self) -> dict[str, float]:
-        return {"expansion_per_k": self.expansion_per_k, "lag_s": self.time_constant_s}
+    FIGURES = ("expansion_per_k", "lag_s=time_constant_s")
 
     @classmethod
     def draw(cls, rng: np.random.Generator, site: Site) -> Self:

@@ -11,34 +11,36 @@ from simulators.arm.statics import Load
 from simulators.defects.defect import ANY_INSTRUMENT, UNKNOWN, Defect, direction, phase
 from simulators.defects.detector import PsdDefect, either_psd
 from simulators.defects.drive import DriveDefect
-from simulators.defects.encoder import EncoderDefect
+from simulators.defects.encoder import ControllerEncoderDefect
 from simulators.defects.scene import Light, Scene, Site
 from simulators.defects.tool import MountDefect
 
 Floats = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
-class TurnedJoint(EncoderDefect):
+class TurnedJoint(ControllerEncoderDefect):
     """Something that turns a joint beyond its encoder, whatever weight does to the arm."""
 
     PHYSICS = UNKNOWN
 
-    def reading_error_rad(self, shaft_rad: Floats, scene: Scene) -> Floats:
-        return self.in_column_rad(shaft_rad, scene)
-
 
 @dataclass(frozen=True)
-class SaturatedProduct(TurnedJoint):
-    """A pull that depends on two other joints and saturates: the joint turns by `turn_rad` tanh(2 sin(qa) sin(qb))."""
+class PulledByTwo(TurnedJoint):
+    """A joint that two other joints turn, together."""
 
     one: int
     other: int
     turn_rad: float
 
-    KIND = "outside-product"
     DRIVERS = ("q{one}", "q{other}")
     SIZE = "turn_rad"
+
+
+@dataclass(frozen=True)
+class SaturatedProduct(PulledByTwo):
+    """A pull that depends on two other joints and saturates: the joint turns by `turn_rad` tanh(2 sin(qa) sin(qb))."""
+
+    KIND = "outside-product"
     TYPICAL = 6e-5
 
     @classmethod
@@ -74,19 +76,13 @@ class NarrowBump(TurnedJoint):
 
 
 @dataclass(frozen=True)
-class CableBundle(TurnedJoint):
+class CableBundle(PulledByTwo):
     """A cable bundle between two joints winds up and pulls a third.
 
     Its torque grows with the product of the two turns that wind it: `turn_rad` for each square radian.
     """
 
-    one: int
-    other: int
-    turn_rad: float
-
     KIND = "outside-cable"
-    DRIVERS = ("q{one}", "q{other}")
-    SIZE = "turn_rad"
     TYPICAL = 4e-5
 
     @classmethod

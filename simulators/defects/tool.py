@@ -131,10 +131,7 @@ class WarmLaser(Defect):
     TYPICAL = 6e-6  # 2 to 12 µrad/K
     INSTRUMENTS = SPOTS
     NEEDS = ("temp_laser_degC",)
-
-    @property
-    def figures(self) -> dict[str, float]:
-        return {"slope_rad_k": self.turn_rad_k}
+    FIGURES = ("slope_rad_k=turn_rad_k",)
 
     @classmethod
     def draw(cls, rng: np.random.Generator, site: Site) -> Self:
@@ -145,8 +142,13 @@ class WarmLaser(Defect):
         return turned_about(np.asarray(self.at_m), turn_rad)
 
 
+class _CarriedOnFlange(CarriedPart):
+    def tool_motion(self, scene: Scene, load: Load) -> Floats:
+        return self.carried(scene)
+
+
 @dataclass(frozen=True)
-class CarriedLaser(CarriedPart):
+class CarriedLaser(_CarriedOnFlange):
     """The laser in its mount, in the flange frame."""
 
     KIND = "carried-laser"
@@ -154,12 +156,9 @@ class CarriedLaser(CarriedPart):
     PORT = "laser.origin"
     INSTRUMENTS = SPOTS
 
-    def tool_motion(self, scene: Scene, load: Load) -> Floats:
-        return self.carried(scene)
-
 
 @dataclass(frozen=True)
-class CarriedTarget(CarriedPart):
+class CarriedTarget(_CarriedOnFlange):
     """The target in its nest, in the flange frame."""
 
     KIND = "carried-target"
@@ -167,12 +166,16 @@ class CarriedTarget(CarriedPart):
     PORT = "tool.point"
     INSTRUMENTS = TARGETS
 
+
+class _Reseated(Bump):
+    ASKED = True
+
     def tool_motion(self, scene: Scene, load: Load) -> Floats:
-        return self.carried(scene)
+        return self.motion(scene)
 
 
 @dataclass(frozen=True)
-class ReseatedTarget(Bump):
+class ReseatedTarget(_Reseated):
     """A reflector or probe that was taken off and put on again, with a grain of dust below it."""
 
     KIND = "reseated-target"
@@ -181,14 +184,10 @@ class ReseatedTarget(Bump):
     TYPICAL = 5e-5
     TURNS_RAD_M = (0.0, 0.0)  # of a point no turn is seen
     INSTRUMENTS = TARGETS
-    ASKED = True
-
-    def tool_motion(self, scene: Scene, load: Load) -> Floats:
-        return self.motion(scene)
 
 
 @dataclass(frozen=True)
-class ReseatedLaser(Bump):
+class ReseatedLaser(_Reseated):
     """A laser that was unscrewed, or knocked, and points along another line from then on."""
 
     KIND = "reseated-laser"
@@ -197,10 +196,6 @@ class ReseatedLaser(Bump):
     TYPICAL = 4e-5
     TURNS_RAD_M = (1.0, 4.0)
     INSTRUMENTS = SPOTS
-    ASKED = True
-
-    def tool_motion(self, scene: Scene, load: Load) -> Floats:
-        return self.motion(scene)
 
 
 @dataclass(frozen=True)

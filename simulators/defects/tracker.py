@@ -49,10 +49,7 @@ class LengthScale(Defect):
     PORT = "device.reading"
     DRIVERS = ("reading",)
     SIZE = "excess"
-
-    @property
-    def figures(self) -> dict[str, float]:
-        return {"scale": self.excess}
+    FIGURES = ("scale=excess",)
 
     @classmethod
     def draw(cls, rng: np.random.Generator, site: Site) -> Self:

@@ -14,7 +14,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from simulators.psd_daq.frames import TransmitLine
+from simulators.psd_daq.frames import RequestWire, TransmitLine
 from simulators.wire import Bench, SerialPort
 
 HOST, GENERIC_USB_UNIT = 0x01, 0x50
@@ -241,20 +241,11 @@ class Kpa101Unit:
             self.line.send(message, self._world.time_s)
 
 
-class Kpa101Wire:
+class Kpa101Wire(RequestWire[AptRequest]):
     """One connection to a unit. Does not imitate: modem lines, so a client's toggling of RTS is not asked for."""
 
     def __init__(self, unit: Kpa101Unit, now_s: Callable[[], float]) -> None:
-        self._unit, self._now_s = unit, now_s
-        self._reader = AptRequestReader()
-
-    def handle(self, data: bytes) -> bytes:
-        for request in self._reader.feed(data):
-            self._unit.obey(request)
-        return self.due()
-
-    def due(self) -> bytes:
-        return self._unit.line.delivered(self._now_s())
+        super().__init__(AptRequestReader().feed, unit.obey, unit.line, now_s)
 
     def refusal(self, request: bytes) -> bytes | None:
         """For injected faults: the rich response to the first request of these bytes."""

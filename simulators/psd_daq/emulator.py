@@ -9,7 +9,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simulators.psd_daq import frames
-from simulators.psd_daq.frames import DEFAULT_BAUD, Kind, Refusal, Request, RequestReader, TransmitLine, nak
+from simulators.psd_daq.frames import (
+    DEFAULT_BAUD,
+    Kind,
+    Refusal,
+    Request,
+    RequestReader,
+    RequestWire,
+    TransmitLine,
+    nak,
+)
 from simulators.wire import Bench, DeviceClock, SerialPort
 
 MIN_RATE_HZ, MAX_RATE_HZ = 100, 4000
@@ -180,7 +189,7 @@ def _turn_a_bit(encoded: bytes) -> bytes:
     return encoded[:at] + bytes((turned,)) + encoded[at + 1 :]
 
 
-class PsdDaqWire:
+class PsdDaqWire(RequestWire[Request]):
     """Bytes to requests, and what has left the line to bytes.
 
     Does not imitate: baud rate (a pseudo-terminal has none, any setting works), modem lines, break, parity errors; the
@@ -188,17 +197,7 @@ class PsdDaqWire:
     """
 
     def __init__(self, box: PsdDaqBox, world: LitFaces) -> None:
-        self._box = box
-        self._world = world
-        self._reader = RequestReader()
-
-    def handle(self, data: bytes) -> bytes:
-        for request in self._reader.feed(data):
-            self._box.obey(request)
-        return self.due()
-
-    def due(self) -> bytes:
-        return self._box.line.delivered(self._world.time_s)
+        super().__init__(RequestReader().feed, box.obey, box.line, lambda: world.time_s)
 
     def refusal(self, request: bytes) -> bytes | None:
         """For injected faults: the box does not take a request that it knows."""

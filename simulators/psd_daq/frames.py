@@ -8,8 +8,10 @@ that bytes take, and a transmit buffer that can overflow.
 import binascii
 import struct
 from collections import deque
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
+from typing import Generic, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -197,3 +199,27 @@ class TransmitLine:
 
     def clear(self) -> None:
         self._queue.clear()
+
+
+AnyRequest = TypeVar("AnyRequest")
+
+
+class RequestWire(Generic[AnyRequest]):
+    """One connection: what `read` makes of the bytes is obeyed in order, and the answers leave on the device's line."""
+
+    def __init__(
+        self,
+        read: Callable[[bytes], Sequence[AnyRequest]],
+        obey: Callable[[AnyRequest], None],
+        line: TransmitLine,
+        now_s: Callable[[], float],
+    ) -> None:
+        self._read, self._obey, self._line, self._now_s = read, obey, line, now_s
+
+    def handle(self, data: bytes) -> bytes:
+        for request in self._read(data):
+            self._obey(request)
+        return self.due()
+
+    def due(self) -> bytes:
+        return self._line.delivered(self._now_s())

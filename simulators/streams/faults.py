@@ -86,14 +86,8 @@ class LateStamps(StreamFault):
     KIND = "stream-late-stamps"
     PHYSICS = "latency"
     PORT = "time"
-
-    @property
-    def drivers(self) -> tuple[str, ...]:
-        return tuple(f"qd{joint}" for joint in range(1, self.joints + 1))
-
-    @property
-    def figures(self) -> dict[str, float]:
-        return {"latency_s": self.by_s}
+    EVERY_JOINT = "qd"
+    FIGURES = ("latency_s=by_s",)
 
     @property
     def size(self) -> float:
@@ -118,10 +112,7 @@ class LaggingEncoder(StreamFault):
     PHYSICS = "reading-lag"
     PORT = "joint{joint}.angle"
     DRIVERS = ("qd{joint}",)
-
-    @property
-    def figures(self) -> dict[str, float]:
-        return {"behind_s": self.time_constant_s}
+    FIGURES = ("behind_s=time_constant_s",)
 
     @property
     def size(self) -> float:
@@ -182,14 +173,8 @@ class EarlyReading(StreamFault):
     KIND = "stream-early-reading"
     PHYSICS = "not-settled"
     PORT = "time"
-
-    @property
-    def drivers(self) -> tuple[str, ...]:
-        return tuple(f"last_move{joint}" for joint in range(1, self.joints + 1))
-
-    @property
-    def figures(self) -> dict[str, float]:
-        return {"tau_s": self.time_constant_s}
+    EVERY_JOINT = "last_move"
+    FIGURES = ("tau_s=time_constant_s",)
 
     @property
     def size(self) -> float:
@@ -235,10 +220,7 @@ class SwingingFoot(StreamFault):
     PHYSICS = "ringing"
     PORT = "base.pose"
     DRIVERS = ("t",)
-
-    @property
-    def figures(self) -> dict[str, float]:
-        return {"frequency_hz": self.frequency_hz, "damping_share": self.damping}
+    FIGURES = ("frequency_hz", "damping_share=damping")
 
     @property
     def size(self) -> float:

@@ -98,20 +98,26 @@ TURN_ACCELERATION_RAD_S2 = 1.4
 Leg = Callable[[Floats], Generator]  # makes the motion of one leg from the joint readings (n,) where it begins
 
 
-class JointMove:
+class TimedMove:
+    """A move from rest to rest under one time law."""
+
+    def __init__(self, law: Trapezoid) -> None:
+        self._law, self._t_s = law, 0.0
+
+    @property
+    def finished(self) -> bool:
+        return self._t_s >= self._law.duration_s
+
+
+class JointMove(TimedMove):
     """All joints start and end together; the one with the longest way keeps to speed and acceleration."""
 
     def __init__(self, start_rad: Floats, end_rad: Floats, speed_rad_s: float, acceleration_rad_s2: float) -> None:
         way_rad = end_rad - start_rad
         longest_rad = float(np.abs(way_rad).max())
-        self._law = trapezoid(longest_rad, speed_rad_s, acceleration_rad_s2)
+        super().__init__(trapezoid(longest_rad, speed_rad_s, acceleration_rad_s2))
         self._start_rad, self._end_rad = start_rad, end_rad
         self._direction = way_rad / longest_rad if longest_rad > 0.0 else way_rad
-        self._t_s = 0.0
-
-    @property
-    def finished(self) -> bool:
-        return self._t_s >= self._law.duration_s
 
     def step(self, now: SetPoint, dt_s: float) -> SetPoint:
         self._t_s += dt_s
@@ -123,7 +129,7 @@ class JointMove:
         )
 
 
-class LineMove:
+class LineMove(TimedMove):
     """The tool point on a straight line, orientation by slerp, both under one time law."""
 
     def __init__(
@@ -133,12 +139,7 @@ class LineMove:
         self._arm, self._T_flange_tool = arm, T_flange_tool
         self._start = arm.tool(start_rad.tolist(), T_flange_tool)
         self._twist = twist_to(self._start, T_base_end)
-        self._law = _slower_law(self._twist, speed_m_s, acceleration_m_s2)
-        self._t_s = 0.0
-
-    @property
-    def finished(self) -> bool:
-        return self._t_s >= self._law.duration_s
+        super().__init__(_slower_law(self._twist, speed_m_s, acceleration_m_s2))
 
     def step(self, now: SetPoint, dt_s: float) -> SetPoint:
         self._t_s += dt_s

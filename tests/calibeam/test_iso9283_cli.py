@@ -13,8 +13,8 @@ from calibeam.cli import run
 from calibeam.motion.cube_in_reach import cube_in_reach, ways_to
 from calibrate.iso9283.cube import cube_corners_m, cube_poses_m
 from calibrate.model.model_file import RigIdentity, write_model
+from tests.calibrate.apply.correct.six_joints import drawn
 
-from ..calibrate.correct.six_joints import drawn
 from ..calibrate.iso9283.tracked_six_joints import DRAWN, REAL, RIG_HERE, RIG_TEXT, cycles, known, seen
 
 CUBE = ["--centre-m", "0.4", "0", "0.35", "--edge-m", "0.2"]

@@ -8,7 +8,7 @@ is that term. Source: R. Paul, Robot Manipulators, 1981, ch. 1.11 and 5.2 (trans
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
+from typing import ClassVar, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,26 +49,28 @@ class Constant:
         return self.T
 
 
+class Unknown:
+    """Not known yet."""
+
+    moves = False
+    why_unknown: ClassVar[str]
+
+    def at(self, s_m: float) -> None:
+        return None
+
+
 @dataclass(frozen=True)
-class Untaught:
+class Untaught(Unknown):
     """Has to be taught by placing the arm."""
 
-    moves = False
     why_unknown = "not taught yet"
-
-    def at(self, s_m: float) -> None:
-        return None
 
 
 @dataclass(frozen=True)
-class Unread:
+class Unread(Unknown):
     """Comes from a reading of a camera during the program."""
 
-    moves = False
     why_unknown = "its camera was not read yet"
-
-    def at(self, s_m: float) -> None:
-        return None
 
 
 @dataclass(frozen=True, eq=False)

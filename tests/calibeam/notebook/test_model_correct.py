@@ -9,9 +9,8 @@ from scipy.spatial.transform import Rotation
 import calibeam
 from calibeam.cli import run
 from calibrate.model.model_file import write_model
-
-from ...calibrate.correct.six_joints import drawn, model, postures, real
-from ...calibrate.physics.two_joints import two_joints
+from tests.calibrate.apply.correct.six_joints import drawn, model, postures, real
+from tests.calibrate.model.with_effects.two_joints import two_joints
 
 Q = postures(5)
 T = drawn().frames(Q)[:, -1]

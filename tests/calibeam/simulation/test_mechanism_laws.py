@@ -1,6 +1,6 @@
 """Every effect of the catalogue against the mechanism that it becomes: both change the readings alike.
 
-The exceptions and their reasons are those of the table itself (calibeam/simulation/mechanism_table.py, `Line.within`).
+The exceptions and their reasons are those of the table itself (calibeam/simulation/mechanism_table.py, `within`).
 """
 
 from dataclasses import replace
@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from acquisition.recording.samples import ORIENTATION, POSITION
 from calibeam.simulation.found import FoundEffect, FoundIn
-from calibeam.simulation.mechanism_table import TABLE, line_of, mechanism_of
+from calibeam.simulation.mechanism_table import TABLE, counterpart_of, mechanism_of
 from calibeam.simulation.rig_in_numbers import rigged
 from calibeam.simulation.scene_of_samples import Clock, scene_of
 from calibrate.fit.identify.session import about_of
@@ -128,7 +128,7 @@ def found_of(term: Term, place: Bench) -> FoundEffect:
 
 @cache
 def one_of_each() -> dict[Family, list[Term]]:
-    """Of every line of the table, and of every port, one: the same line at six joints is one law.
+    """Of every entry of the table, and of every port, one: the same entry at six joints is one law.
 
     And so it is in every family that has that port: they take turns.
     """
@@ -166,7 +166,7 @@ def test_every_effect_is_what_its_mechanism_does(family: Family) -> None:
     for term in one_of_each()[family]:
         found = found_of(term, place)
         off, whole = place.apart(found)
-        if off > line_of(found).within * whole + 1e-11:
+        if off > counterpart_of(found).within * whole + 1e-11:
             wrong.append(f"{term.key}: {off:.2e} of {whole:.2e}")
     assert not wrong, "\n".join(wrong)
 
@@ -198,10 +198,10 @@ def test_all_stations_of_a_table_move_as_one_body_where_the_arm_goes_to_and_fro_
     assert off < 0.02 * whole
 
 
-def test_every_line_of_the_table_is_met_by_the_catalogue() -> None:
+def test_every_entry_of_the_table_is_met_by_the_catalogue() -> None:
     benches = (*map(bench, FAMILIES), bench("dual-psd", in_turns=True))
-    met = {id(line_of(found_of(term, place))) for place in benches for term in acting(place)}
-    never = [f"{line.physics}: {line.form}" for line in TABLE if id(line) not in met]
+    met = {id(counterpart_of(found_of(term, place))) for place in benches for term in acting(place)}
+    never = [f"{form.physics}: {form.name}" for form, counterpart in TABLE.items() if id(counterpart) not in met]
     assert never == []
 
 
@@ -217,7 +217,7 @@ def test_two_encoders_see_the_drive_from_where_they_sit() -> None:
         found = replace(found_of(term, place), session=session)
         by = Perturbation.none(rows, 6).plus(term.port, found.amount)
         read = place.simulated((mechanism_of(found),))
-        within = line_of(found).within
+        within = counterpart_of(found).within
         wanted = by.between_rad + by.readings.get(ENCODER_DIFFERENCE, 0.0)
         assert rms(read.between_rad - wanted) <= within * rms(wanted) + 1e-9, term.key
         change = place.modelled(place.samples.joints(), by) - place.expected
@@ -233,4 +233,4 @@ def test_every_effect_is_what_its_mechanism_does_at_every_place(family: Family) 
     for term in acting(place):
         found = found_of(term, place)
         off, whole = place.apart(found)
-        assert off <= line_of(found).within * whole + 1e-11, term.key
+        assert off <= counterpart_of(found).within * whole + 1e-11, term.key
