@@ -1,5 +1,5 @@
 """How sure a diagnosis is: findings with their alternatives, what has no name, unseen rows, stated noise, detection
-limits, and what these poses cannot tell apart.
+limits, and effects that these poses cannot separate.
 """
 
 from calibrate.diagnose.doubts.diagnosis import Finding, Named, Verdict
