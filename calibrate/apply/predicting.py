@@ -3,9 +3,6 @@
 One sigma of a prediction is that of the covariance of geometry, frames and effects together, mapped through the
 readings, and of the conditions that a row lacks; the instrument's own noise is apart.
 
-Flange poses of many rows at values that differ little from those already computed: only what changed is multiplied.
-Exact, and no linearisation: behind a changed link or zero the arm moves as a whole.
-
 The robot's own base frame is the one that lies best on the arm itself, wherever in the world the arm stands. A device
 of unknown place does not show where the base is, nor a first joint how the base is turned beside its zero. As in the
 predicted error over the workspace (uncertainty/free_space.py) such a motion of everything is no error of the arm.
@@ -25,7 +22,6 @@ from scipy.spatial.transform import Rotation
 from acquisition.recording import Samples
 from calibrate.errors import DataError
 from calibrate.fit.weighting import Weighting
-from calibrate.model.arms.serial import SerialArm
 from calibrate.model.effects.ports import Perturbation, Port
 from calibrate.model.measured import Measured
 from calibrate.model.model_file import ModelFile
@@ -45,7 +41,8 @@ from calibrate.model.with_effects.acting import (
     moved_columns,
 )
 from calibrate.model.with_effects.applied import Applied, effects_at
-from calibrate.model.with_effects.ported_chain import look, offsets, perturbed_frames
+from calibrate.model.with_effects.chain import twists_by_arm
+from calibrate.model.with_effects.ported_chain import look, offsets
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
@@ -202,16 +199,14 @@ def _with_sigma(model: ModelFile, predictor: Predictor, samples: Samples, applie
 
 
 def _flange(predictor: Predictor, applied: Applied, q_rad: Floats) -> Callable[[Predictor, Perturbation], Floats]:
-    """(row, 4, 4) of the flange at any values and perturbation; under that of the effects, known frames are kept."""
-    if not applied.found:
-        return lambda other, by: other.flange(q_rad)
-    arm = arm_in(predictor)
-    at_shafts = predictor.at_shafts(q_rad)
-    known = Flanges.of(arm, predictor.values_of(arm.parameters), at_shafts, applied.by)
+    """(row, 4, 4) of the flange at any perturbation, and at values so near that it moves by the chain's derivative."""
+    arm, at_shafts = arm_in(predictor), predictor.at_shafts(q_rad)
+    theta, frames = predictor.values_of(arm.parameters), flange_frames(arm, predictor, q_rad, applied.by)
+    twists = twists_by_arm(arm, theta, at_shafts, applied.by, frames)
 
     def at(other: Predictor, by: Perturbation) -> Floats:
         if by is applied.by and np.array_equal(other.at_shafts(q_rad), at_shafts):
-            return known.at(other.values_of(arm.parameters))
+            return offsets(twists @ (other.values_of(arm.parameters) - theta)) @ frames[:, -1]
         return flange_frames(arm, other, q_rad, by)[:, -1]
 
     return at
@@ -337,50 +332,6 @@ def placed(
     sigma[:, [0, 1, 2, 6, 7, 8]] = np.hypot(sigma[:, [0, 1, 2, 6, 7, 8]], left_m(model))
     notes = (*applied.notes, *_of_left(model))
     return Placed(T, sigma[:, :6], tip_at(predictor, T), sigma[:, 6:], applied.outside, notes)
-
-
-@dataclass(frozen=True, eq=False)
-class Flanges:
-    """Of one arm at joint readings (row, joint) under one perturbation."""
-
-    arm: SerialArm
-    theta: Floats  # (param,)
-    q_rad: Floats
-    by: Perturbation
-    frames: Floats  # (row, joint + 1, 4, 4)
-
-    @classmethod
-    def of(cls, arm: SerialArm, theta: Floats, q_rad: Floats, by: Perturbation) -> "Flanges":
-        return cls(arm, theta, q_rad, by, perturbed_frames(arm, theta, q_rad, by))
-
-    def at(self, theta: Floats) -> Floats:
-        """(row, 4, 4) at other values (param,), the perturbation being the same."""
-        was, now = self.arm.fixed_parts(self.theta), self.arm.fixed_parts(theta)
-        turned = self.arm.angle_offset_rad(theta) - self.arm.angle_offset_rad(self.theta)
-        flange = self.frames[:, -1]
-        for k in range(self.arm.n_joints, -1, -1):  # from the flange: frames in front of a change are as they were
-            if np.any(was[k] != now[k]):
-                flange = _behind(self._before_offset(k), inverse(was[k]) @ now[k], flange)
-            if k > 0 and turned[k - 1] != 0.0:
-                flange = _behind(self.frames[:, k - 1], _about_z(float(turned[k - 1])), flange)
-        return flange
-
-    def _before_offset(self, k: int) -> Floats:
-        """(row, 4, 4) frame k without what effects add there."""
-        own = self.by.frames[:, k]
-        return self.frames[:, k] @ inverse(offsets(own)) if np.any(own) else self.frames[:, k]
-
-
-def _behind(B: Floats, D: Floats, T: Floats) -> Floats:
-    """(row, 4, 4) T with all that is behind frames B moved by D, as seen in B."""
-    return B @ (D @ (inverse(B) @ T))
-
-
-def _about_z(angle_rad: float) -> Floats:
-    c, s = np.cos(angle_rad), np.sin(angle_rad)
-    out = np.eye(4)
-    out[:2, :2] = [[c, -s], [s, c]]
-    return out
 
 
 def without_effects(weighting: Weighting, theta: Floats, samples: Samples, model: ModelFile) -> Weighting:

@@ -167,8 +167,7 @@ def _with_free(simulated: Simulated, model: Fitted, limits: Mapping[str, float])
         for p, value in zip(session.weighting.parameters, values, strict=True)
     )
     session = replace(session, weighting=replace(session.weighting, chosen=chosen))
-    problem = replace(model.problem, session=session, last={}, slopes={}, kept=[], added={})
-    return replace(model, session=session, problem=problem).refitted(model.accepted)
+    return replace(model, session=session, problem=model.problem.of_session(session)).refitted(model.accepted)
 
 
 def _asked(simulated: Simulated, samples: Samples, rng: Generator, freed: Sequence[Part]) -> Diagnosed:

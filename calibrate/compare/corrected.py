@@ -19,7 +19,7 @@ from acquisition.recording.rig import Rig
 from acquisition.recording.samples import ORIENTATION, POSITION, SPOTS, per_joint
 from calibrate.compare.chain import Pair, columns_of
 from calibrate.compare.seated import is_seated
-from calibrate.diagnose.state import Augmented, Fitted, Session, noise_of, session_of
+from calibrate.diagnose.state import EffectProblem, Fitted, Session, noise_of, session_of
 from calibrate.errors import DataError
 from calibrate.fit.identify.session import about_of, believed_sigma
 from calibrate.fit.solvers import NEAR_START, solve
@@ -93,7 +93,7 @@ def simulated_of(rig: Rig, samples: Samples) -> Simulated:
     session = compared_session(rig, samples)
     rows = tuple(np.arange(m.problem.rows) for m in session.measured)
     whiteners = tuple(_diagonal(1.0 / believed_sigma(m)) for m in session.measured)
-    problem = Augmented(session, (), None, rows, whiteners, ())
+    problem = EffectProblem(session, session.chain(), rows, whiteners)
     fit = solve(problem, start=session.start, damping=NEAR_START)
     noise = noise_of(problem, fit)
     return Simulated(Fitted(session, np.arange(len(samples)), problem, fit.theta, noise, fit.covariance))
@@ -198,7 +198,7 @@ def _turned_joints(pair: Pair, fitted: Fitted, changed: Mapping[str, Floats]) ->
         if m.name not in SEATED:
             continue
         missed = m.problem.observed - fitted.around.expected[i]
-        by_joint = fitted.problem.by_joint(fitted.around, i)
+        by_joint = fitted.problem.chain.by_joint(fitted.around, i)
         turn = np.einsum("rjk,rk->rj", np.linalg.pinv(by_joint), missed).reshape(len(missed), -1, n)
         for pose, rows in enumerate(m.sample_rows.T):
             q_rad[rows] += np.where(seated[rows, None], turn[:, pose], 0.0)

@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 from calibrate.errors import DataError
 from calibrate.fit.noise.shared_scatter import SharedScatter
-from calibrate.model.parameters import Parameter, index_of
+from calibrate.model.parameters import Parameter
 from calibrate.model.problem import Block, Problem
+from calibrate.model.unknowns import Unknowns
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -51,13 +52,13 @@ class JointProblem:
     def __post_init__(self) -> None:
         if not self.blocks:
             raise DataError("joint problem: no blocks at all; give at least one instrument's observations")
-        merged = tuple(p.name for p in self._merged)
+        merged = tuple(p.name for p in self.unknowns.parameters)
         if self.chosen is not None and tuple(p.name for p in self.chosen) != merged:
             raise DataError(f"joint problem: chosen parameters are not those of the blocks in order: {merged}")
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
-        return self._merged if self.chosen is None else self.chosen
+        return self.unknowns.parameters if self.chosen is None else self.chosen
 
     @property
     def rows(self) -> int:
@@ -92,10 +93,10 @@ class JointProblem:
         return own + self.witnessed.added(block, index, self.witnessed.problem.misfit(of_witness))
 
     def jacobian(self, theta: Floats) -> Floats:
-        parts = [block.jacobian(theta[columns]) for block, columns in zip(self.blocks, self._columns, strict=True)]
+        parts = [block.jacobian(self.of_block(i, theta)) for i, block in enumerate(self.blocks)]
         out = np.zeros((sum(len(part) for part in parts), len(self.parameters)))
         first = 0
-        for i, (part, columns) in enumerate(zip(parts, self._columns, strict=True)):
+        for i, (part, columns) in enumerate(zip(parts, self.unknowns.columns, strict=True)):
             out[first : first + len(part), columns] = part
             self._share_slope(i, theta, out[first : first + len(part)])
             first += len(part)
@@ -114,7 +115,7 @@ class JointProblem:
             return
         witness, seen = self.witnessed.scatter.witness, self.witnessed.problem
         slope = seen.chain.jacobian(self.of_block(witness, theta), seen.q_rad)
-        out[:, self._columns[witness]] += self.witnessed.added(block, index, slope)
+        out[:, self.unknowns.columns[witness]] += self.witnessed.added(block, index, slope)
 
     def with_parameters(self, parameters: tuple[Parameter, ...]) -> "JointProblem":
         """The same blocks with these held, bounded or assumed otherwise."""
@@ -135,19 +136,17 @@ class JointProblem:
 
     def fulfilled(self, theta: Floats) -> "JointProblem":
         """Where rank is to be judged: conditions at joint readings that fulfil them (Problem.fulfilled)."""
-        values = (theta[columns] for columns in self._columns)
+        values = (theta[columns] for columns in self.unknowns.columns)
         each = zip(self.blocks, values, strict=True)
         return self.with_blocks(tuple(b.fulfilled(own) if isinstance(b, Problem) else b for b, own in each))
 
     def of_block(self, block: int, theta: Floats) -> Floats:
         """The values of one block's own parameters."""
-        return theta[self._columns[block]]
+        return self.unknowns.of_block(block, theta)
 
     def spread(self, block: int, columns: Floats) -> Floats:
         """(..., param) derivatives (..., own) by one block's own parameters, put where those stand among all."""
-        out = np.zeros((*columns.shape[:-1], len(self.parameters)))
-        out[..., self._columns[block]] = columns
-        return out
+        return self.unknowns.spread(block, columns)
 
     def by_row(self, theta: Floats) -> Floats:
         """(rows,) sum of the squared whitened residuals of each row: chi-square of k where nothing is wrong."""
@@ -163,25 +162,5 @@ class JointProblem:
         return tuple(np.concatenate([[0], np.cumsum([block.rows for block in self.blocks])[:-1]]).astype(int).tolist())
 
     @cached_property
-    def _merged(self) -> tuple[Parameter, ...]:
-        found: dict[str, Parameter] = {}
-        for block in self.blocks:
-            for p in block.parameters:
-                found[p.name] = _agreed(found[p.name], p) if p.name in found else p
-        return tuple(found.values())
-
-    @cached_property
-    def _columns(self) -> tuple[Indices, ...]:
-        index = index_of(self._merged)
-        return tuple(np.array([index[p.name] for p in block.parameters], dtype=np.intp) for block in self.blocks)
-
-
-def _agreed(one: Parameter, other: Parameter) -> Parameter:
-    for what in ("unit", "start", "prior", "lower", "upper", "plausible"):
-        a, b = getattr(one, what), getattr(other, what)
-        if a != b:
-            raise DataError(
-                f"joint problem: parameter {one.name} has {what} {a} in one block and {b} in another; "
-                "build all blocks from the same rig"
-            )
-    return one if one.free else replace(one, free=other.free)
+    def unknowns(self) -> Unknowns:
+        return Unknowns([block.parameters for block in self.blocks])

@@ -160,7 +160,7 @@ def _own(model: Fitted, i: int, quantity: Quantity) -> Floats:
 
 def _levers(model: Fitted, i: int, quantity: Quantity) -> Floats:
     """(joint reading, row, k) by which the readings follow each joint."""
-    by_joint = model.problem.by_joint(model.around, i)[model.problem.rows[i]]
+    by_joint = model.problem.chain.by_joint(model.around, i)[model.problem.rows[i]]
     return np.moveaxis(by_joint[:, quantity.part], 2, 0)
 
 

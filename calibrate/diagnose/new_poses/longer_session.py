@@ -14,12 +14,7 @@ from numpy.typing import NDArray
 from acquisition.recording import Samples
 from acquisition.recording.samples import per_joint
 from calibrate.diagnose.state.assumed import Stated
-from calibrate.diagnose.state.augmented import (
-    Around,
-    Augmented,
-    columns_of,
-    plain_sizes,
-)
+from calibrate.diagnose.state.effect_problem import EffectProblem, plain_sizes
 from calibrate.diagnose.state.fitted import Fitted
 from calibrate.diagnose.state.session import Session, drivers_of
 from calibrate.errors import DataError
@@ -31,6 +26,7 @@ from calibrate.model.effects.term import Accepted, Term
 from calibrate.model.measured import Measured
 from calibrate.model.parameters import plausible_sizes, priors
 from calibrate.model.problem import whitener_of
+from calibrate.model.with_effects.chain import Chain, ChainAt, columns_of
 from calibrate.model.with_effects.new_poses import alike
 
 Floats = NDArray[np.float64]
@@ -60,7 +56,7 @@ class Elsewhere:
     state: Fitted
     session: Session  # new poses behind the measured ones
     drivers: Drivers
-    around: Around
+    around: ChainAt
     rows: tuple[Ints, ...]  # of each instrument: those that the fit has seen, then those of new poses
     whiteners: tuple[Floats, ...]
     shared: SharedScatter | None
@@ -98,7 +94,7 @@ class Elsewhere:
         """What a carried term adds to the readings: (row,) of the measured rows, (pose, k) of the new ones."""
         amount = accepted.term.amount(self.drivers, accepted.coefficients, accepted.inner)[..., None]
         columns = columns_of(self.session.measured, accepted.term.port, amount, self.around)
-        seen = self._problem((), ()).whitened(columns)
+        seen = self._problem().whitened(columns)
         measured, new = self._parted(seen)
         return measured[:, 0], new[..., 0]
 
@@ -109,7 +105,7 @@ class Elsewhere:
         terms, known = (*self.brought, *terms), self.state.problem
         sizes = plain_sizes(self.session, terms, self.drivers, self.whiteners, self.rows)
         problem = replace(self._problem(terms, sizes), given=known.given, assumed=known.assumed)
-        values = np.concatenate([self.state.geometry, problem.start[len(self.state.geometry) :]])
+        values = problem.from_geometry(self.state.geometry)
         parameters = problem.parameters
         free = np.flatnonzero([p.free for p in parameters])
         scale, sigma = plausible_sizes(parameters)[free], priors(parameters)[free]
@@ -120,9 +116,9 @@ class Elsewhere:
         measured, new = self._parted(seen)
         return np.concatenate([measured, parts[-1], np.diag(scale / sigma)]), new
 
-    def _problem(self, terms: tuple[Accepted, ...], sizes: tuple[Floats, ...]) -> Augmented:
-        bare = Augmented(self.session, terms, self.drivers, self.rows, self.whiteners, sizes)
-        return replace(bare, shared=self.shared)
+    def _problem(self, terms: Sequence[Accepted] = (), sizes: tuple[Floats, ...] = ()) -> EffectProblem:
+        chain = self.session.chain(terms, self.drivers)
+        return EffectProblem(self.session, chain, self.rows, self.whiteners, sizes, shared=self.shared)
 
     def _parted(self, seen: Sequence[Floats]) -> tuple[Floats, Floats]:
         """(row, m) of measured rows and (pose, k of all instruments, m) of new ones, zero where none reads."""
@@ -149,14 +145,13 @@ def elsewhere(state: Fitted, poses: NewPoses) -> Elsewhere:
         for seen, m, longer in zip(state.problem.rows, state.session.measured, measured, strict=True)
     )
     whiteners = tuple(_whiteners(state, i, n, poses, measured[i]) for i in range(len(measured)))
-    plain = Augmented(session, (), None, rows, whiteners, ())
-    bare = plain.around(state.geometry)
+    plain = session.chain()
+    bare = plain.at(state.geometry)
     drivers, shared = _drivers(session, bare, state, poses), _shared(state, plain, bare)
     found = Elsewhere(state, session, drivers, bare, rows, whiteners, shared)
     carried = (*found.brought, *(a for a in map(found.carried, state.accepted) if a is not None))
-    with_terms = Augmented(session, carried, drivers, rows, whiteners, ())
-    values = np.concatenate([state.geometry, with_terms.start[len(state.geometry) :]])
-    around = with_terms.around(values)
+    chain = session.chain(carried, drivers)
+    around = chain.at(np.concatenate([state.geometry, chain.of_effects]))
     return replace(found, drivers=_drivers(session, around, state, poses), around=around)
 
 
@@ -207,16 +202,16 @@ def _whiteners(state: Fitted, i: int, n: int, poses: NewPoses, longer: Measured)
     return np.concatenate([known, whitener_of(like)])
 
 
-def _shared(state: Fitted, longer: Augmented, at: Around) -> SharedScatter | None:
+def _shared(state: Fitted, longer: Chain, at: ChainAt) -> SharedScatter | None:
     """What instruments share at new poses, where second encoders answer as well."""
-    shared, measured = state.noise.shared, longer.session.measured
+    shared, measured = state.noise.shared, longer.measured
     if shared is None:
         return None
     chains, by_joint = [m.problem.chain for m in measured], [longer.by_joint(at, i) for i in range(len(measured))]
     return replace(shared, levers=levers_of(chains, [m.sample_rows for m in measured], by_joint))
 
 
-def _drivers(session: Session, at: Around, state: Fitted, poses: NewPoses) -> Drivers:
+def _drivers(session: Session, at: ChainAt, state: Fitted, poses: NewPoses) -> Drivers:
     joint = session.weighting.unweighted
     expected = {m.name: e for m, e in zip(session.measured, at.expected, strict=True)}
     own = {m.name: joint.of_block(i, state.geometry) for i, m in enumerate(session.measured)}

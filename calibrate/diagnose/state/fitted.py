@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibrate.diagnose.state.assumed import Assumed
-from calibrate.diagnose.state.augmented import Around, Augmented, plain_sizes
+from calibrate.diagnose.state.effect_problem import EffectProblem, plain_sizes
 from calibrate.diagnose.state.in_sight import in_sight, solve_in_sight
 from calibrate.diagnose.state.linearised import Rows, Unseen
 from calibrate.diagnose.state.noise_of_fit import (
@@ -47,6 +47,7 @@ from calibrate.model.parameters import (
 )
 from calibrate.model.problem import whitener_of
 from calibrate.model.sensors import point_line, seat
+from calibrate.model.with_effects.chain import ChainAt
 from calibrate.model.with_effects.driver_values import as_before
 
 Floats = NDArray[np.float64]
@@ -73,7 +74,7 @@ class Fitted:
 
     session: Session
     active: Ints  # samples that the fit sees, sorted
-    problem: Augmented
+    problem: EffectProblem
     values: Floats  # of the problem's parameters
     noise: Noise  # of each instrument, over its active rows
     covariance: Floats  # (value, value) posterior; zero for held ones
@@ -117,7 +118,7 @@ class Fitted:
         return replace(self, problem=noise.under(self.problem), noise=noise)
 
     @cached_property
-    def around(self) -> Around:
+    def around(self) -> ChainAt:
         """Frames and expected readings of all samples, active or not."""
         return self.problem.around(self.values)
 
@@ -207,7 +208,7 @@ class Fitted:
         """
         problem, drivers, samples = self.problem, self.drivers, self._followed
         if samples is None:
-            return problem.whitened(problem.columns(term.port, term.basis(drivers, inner), self.around))
+            return problem.whitened(problem.chain.columns(term.port, term.basis(drivers, inner), self.around))
         directions = term.along(drivers) if isinstance(term, Form) else None
         if not isinstance(term, Form) or directions is None:
             basis = term.basis(drivers, inner)
@@ -232,7 +233,7 @@ class Fitted:
         key = (port, directions.tobytes())
         if key not in self._levers:
             each = np.broadcast_to(directions, (len(self.around.frames), *directions.shape))
-            self._levers[key] = self.problem.whitened(self.problem.columns(port, each, self.around))
+            self._levers[key] = self.problem.whitened(self.problem.chain.columns(port, each, self.around))
         return self._levers[key]
 
     @cached_property
@@ -284,10 +285,9 @@ class Fitted:
         terms = (*self._split[1][:given], *accepted)
         drivers, whiteners, rows = self.drivers if terms else None, whiteners_of(noise.scatters), self.problem.rows
         sizes = plain_sizes(self.session, terms, drivers, whiteners, rows)
-        problem = Augmented(self.session, terms, drivers, rows, whiteners, sizes, given, assumed)
-        problem = replace(problem, kept=list(self.problem.kept))
-        start = np.concatenate([self.geometry, problem.start[len(self.geometry) :]])
-        return _settled(_turn(problem, self.active, start, noise))
+        chain, known = self.session.chain(terms, drivers), self.problem.known.of_other_effects()
+        problem = EffectProblem(self.session, chain, rows, whiteners, sizes, given, assumed, known=known)
+        return _settled(_turn(problem, self.active, problem.from_geometry(self.geometry), noise))
 
 
 def fit_geometry(session: Session, active: Ints | None = None) -> Fitted:
@@ -299,7 +299,7 @@ def fit_geometry(session: Session, active: Ints | None = None) -> Fitted:
         for m, r in zip(session.measured, rows, strict=True)
     )
     whiteners = tuple(np.broadcast_to(W, (len(r), *W.shape)) for W, r in zip(unit, rows, strict=True))
-    problem = Augmented(session, (), None, rows, whiteners, ())
+    problem = EffectProblem(session, session.chain(), rows, whiteners)
     fits: list[Fitted] = []
     for loss in (Loss.SQUARE, Loss.HUBER):
         seen = in_sight(problem, session.start)
@@ -325,7 +325,8 @@ def fit_from_model(
     noise = geometry.noise.trusted
     whiteners, rows = whiteners_of(noise.scatters), geometry.problem.rows
     sizes = plain_sizes(session, terms, geometry.drivers, whiteners, rows)
-    problem = noise.under(Augmented(session, terms, geometry.drivers, rows, whiteners, sizes, len(terms)))
+    chain = session.chain(terms, geometry.drivers)
+    problem = noise.under(EffectProblem(session, chain, rows, whiteners, sizes, len(terms)))
     free = np.flatnonzero([p.free for p in problem.parameters])
     near = assumed.held_near(problem.jacobian(start), np.setdiff1d(free, assumed.at), unit)
     return _settled(_turn(replace(problem, assumed=near), geometry.active, start, noise))
@@ -362,7 +363,7 @@ def _settled(fitted: Fitted, renewing: bool = False) -> Fitted:
     return replace(best, steps=fitted.steps, stop=Stop.ROUNDS)
 
 
-def _turn(problem: Augmented, active: Ints, start: Floats, noise: Noise, tolerance: float = TOLERANCE) -> Fitted:
+def _turn(problem: EffectProblem, active: Ints, start: Floats, noise: Noise, tolerance: float = TOLERANCE) -> Fitted:
     """Least squares under the noise so far, along what the data see, then the noise that is left."""
     problem = noise.under(problem)
     seen = in_sight(problem, start)
@@ -382,8 +383,7 @@ def _cut(state: Fitted, active: Ints) -> Fitted:
         value, weights = likelihood_of(apart[i][r], covariance)
         scatters.append(Scatter(covariance, weights, value, state.scatters[i].free))
     noise = Noise(tuple(scatters), shared)
-    problem = replace(noise.under(state.problem), rows=rows, last=dict(state.problem.last), slopes={}, added={})
-    problem = replace(problem, kept=list(problem.kept))
+    problem = replace(noise.under(state.problem), rows=rows, known=state.problem.known.of_other_rows())
     return replace(state, active=active, problem=problem, noise=noise)
 
 
@@ -392,7 +392,7 @@ def _rows_of(session: Session, active: Ints) -> tuple[Ints, ...]:
 
 
 def places_found(
-    problem: Augmented, values: Floats, scatters: tuple[Scatter, ...], rows: tuple[Ints, ...], data_rows: int
+    problem: EffectProblem, values: Floats, scatters: tuple[Scatter, ...], rows: tuple[Ints, ...], data_rows: int
 ) -> Floats:
     """Values in which places that the fit has not met are found from these rows of each instrument, all else held.
 
@@ -408,7 +408,7 @@ def places_found(
         whitener_of(covariance_at(s, old, r)) for s, old, r in zip(scatters, problem.rows, rows, strict=True)
     )
     held = tuple(p if u else replace(p, free=False) for p, u in zip(parameters, unmet, strict=True))
-    there = replace(problem, rows=rows, whiteners=whiteners, last={}, slopes={}, kept=[], added={})
+    there = problem.with_rows(rows, whiteners)
     return solve(_Held(there, held), start=values, damping=NEAR_START).theta
 
 
@@ -416,7 +416,7 @@ def places_found(
 class _Held:
     """A problem with other priors."""
 
-    problem: Augmented
+    problem: EffectProblem
     parameters: tuple[Parameter, ...]
 
     def residual(self, theta: Floats) -> Floats:

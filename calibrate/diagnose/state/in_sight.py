@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from calibrate.diagnose.state.augmented import Augmented
+from calibrate.diagnose.state.effect_problem import EffectProblem
 from calibrate.diagnose.state.visible import VISIBLE
 from calibrate.fit.solvers import Fit, Loss, covariance_of, solve, triangle_of
 from calibrate.model.parameters import (
@@ -41,7 +41,7 @@ class Directions:
     own: Ints  # (move,) the value that a move is, of those with bounds; -1 elsewhere
 
 
-def in_sight(problem: Augmented, theta: Floats) -> Directions:
+def in_sight(problem: EffectProblem, theta: Floats) -> Directions:
     """Of a problem at values theta (value,). Terms in the order in which they were accepted.
 
     The rows of the data enter as their triangle, which has the same products of columns in far fewer rows.
@@ -65,7 +65,7 @@ def in_sight(problem: Augmented, theta: Floats) -> Directions:
     return Directions(moves, np.concatenate(own))
 
 
-def _units(problem: Augmented) -> Floats:
+def _units(problem: EffectProblem) -> Floats:
     """(value,) sizes to be expected; of terms what is assumed about them, which is loose."""
     assumed, plausible = priors(problem.parameters), plausible_sizes(problem.parameters)
     return np.where(problem.owner < 0, np.minimum(assumed, plausible), plausible)
@@ -113,7 +113,7 @@ def _of_term(rows: Floats, mine: Ints, basis: Floats, values: int) -> tuple[Floa
 class _Along:
     """LeastSquares of how far to go along each direction; assumptions are rows like the others."""
 
-    problem: Augmented
+    problem: EffectProblem
     directions: Directions
     start: Floats  # (value,)
     believed: Ints
@@ -154,7 +154,7 @@ def _bounds(parameter: Parameter) -> tuple[float, float]:
 
 
 def solve_in_sight(
-    problem: Augmented,
+    problem: EffectProblem,
     start: Floats,
     directions: Directions,
     *,
@@ -183,7 +183,7 @@ def solve_in_sight(
     )
 
 
-def _covariance(problem: Augmented, theta: Floats, free: Ints, believed: Ints, sigma: Floats) -> Floats:
+def _covariance(problem: EffectProblem, theta: Floats, free: Ints, believed: Ints, sigma: Floats) -> Floats:
     """(value, value) of all free values, along what is not seen by what is assumed; nan where it does not exist."""
     n, unit = len(theta), plausible_sizes(problem.parameters)[free]
     beliefs = np.zeros((len(believed), len(free)))

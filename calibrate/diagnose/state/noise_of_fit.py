@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from calibrate.diagnose.state.augmented import Augmented
+from calibrate.diagnose.state.effect_problem import EffectProblem
 from calibrate.fit.identify.session import believed_sigma
 from calibrate.fit.noise import Scatter, SharedScatter, levers_of, likelihood_of, scatter_of, shares_found, witness_of
 from calibrate.fit.solvers import Fit
@@ -26,7 +26,7 @@ class Noise:
     scatters: tuple[Scatter, ...]  # of each instrument, without what it shares
     shared: SharedScatter | None = None  # over all rows; None: nothing
 
-    def under(self, problem: Augmented) -> Augmented:
+    def under(self, problem: EffectProblem) -> EffectProblem:
         """The problem with weights from this noise."""
         return problem.under(whiteners_of(self.scatters), self.shared)
 
@@ -45,12 +45,12 @@ class Noise:
         return tuple(s if more is None else replace(s, covariance=s.covariance + more[r]) for s, more, r in each)
 
 
-def noise_of(problem: Augmented, fit: Fit) -> Noise:
+def noise_of(problem: EffectProblem, fit: Fit) -> Noise:
     """Noise of every instrument at the values of a fit; what they share with second encoders is found first."""
     at, larger = problem.around(fit.theta), freedom(problem, fit.theta, fit.covariance)
     measured = problem.session.measured
     residuals = [m.problem.observed - expected for m, expected in zip(measured, at.expected, strict=True)]
-    by_joint = [problem.by_joint(at, i) for i in range(len(measured))]
+    by_joint = [problem.chain.by_joint(at, i) for i in range(len(measured))]
 
     def found(i: int, residual: Floats) -> Scatter:
         rows = problem.rows[i]
@@ -78,7 +78,7 @@ def _trust(seen: Scatter, residual: Floats, known: Ints) -> Floats:
     return np.clip(weights / GLITCH, 0.0, 1.0)
 
 
-def freedom(problem: Augmented, values: Floats, covariance: Floats) -> Floats:
+def freedom(problem: EffectProblem, values: Floats, covariance: Floats) -> Floats:
     """(instrument,) numbers over numbers less what was fitted to them: residuals of a fit are smaller than the noise.
 
     What an instrument has given to the fit is the trace of its part of the hat matrix, J C J' of whitened rows: spots

@@ -4,7 +4,7 @@ Drawings hold what data cannot see; where a rig states no tolerance, wide priors
 well-seen parameters, but keep cones, which hold no scale, from shrinking the arm.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -28,10 +28,12 @@ from calibrate.model.effects.drivers import (
     temperatures_of,
     uncoupled_samples,
 )
+from calibrate.model.effects.term import Accepted
 from calibrate.model.measured import Measured
 from calibrate.model.parameters import Parameter
 from calibrate.model.sensors.catalogue import SENSORS, names_with
 from calibrate.model.sensors.kind import Trait
+from calibrate.model.with_effects.chain import Chain
 from calibrate.model.with_effects.driver_values import readout_at
 
 Floats = NDArray[np.float64]
@@ -54,6 +56,11 @@ class Session:
     @property
     def measured(self) -> tuple[Measured, ...]:
         return self.weighting.measured
+
+    def chain(self, terms: Sequence[Accepted] = (), drivers: Drivers | None = None) -> Chain:
+        """Of all its samples, with these effects at these drivers."""
+        unknowns = self.weighting.unweighted.unknowns
+        return Chain(self.arm, self.samples.joints(), self.measured, unknowns, tuple(terms), drivers)
 
     @cached_property
     def conditions(self) -> Conditions:

@@ -99,7 +99,7 @@ def test_derivatives_of_few_samples_are_those_rows_of_all(geometry):
     state = with_terms(geometry, *BENT)
     few = np.arange(0, state.samples, 3)
     cut = state.select(few)
-    (whole,), (own,) = (one.problem.forgetting()._slopes(state.values) for one in (state, cut))
+    (whole,), (own,) = (one.problem.forgetting().slopes(state.values) for one in (state, cut))
     assert len(own) == len(few) < len(whole)
     assert own == pytest.approx(whole[cut.problem.rows[0]], abs=1e-12 * np.max(np.abs(whole)))
 

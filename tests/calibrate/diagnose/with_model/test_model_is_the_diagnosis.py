@@ -24,6 +24,7 @@ from calibrate.model.effects.base_moved import EFFECT as BASE_MOVED
 from calibrate.model.effects.term import Accepted, Shape
 from calibrate.model.effects.time_laws import FOR_A_WHILE
 from calibrate.model.sensors.catalogue import kind_of
+from calibrate.model.with_effects.chain import Evaluations
 from simulators.conceal.case import conceal
 from simulators.conceal.case_files import write_case
 from simulators.conceal.wanted import FAMILIES, Wanted
@@ -72,16 +73,8 @@ def with_term(fit, term):
     coefficients = direction * PLAIN / np.max(np.abs(basis @ direction))
     smooth = np.array([value for spec, value in zip(term.inner, inner, strict=True) if not spec.discrete])
     own, sizes = np.concatenate([coefficients, smooth]), (np.full(len(coefficients), PLAIN),)
-    problem = replace(
-        fit.problem,
-        terms=(Accepted(term, coefficients, inner),),
-        drivers=fit.drivers,
-        sizes=sizes,
-        last={},
-        slopes={},
-        kept=[],
-        added={},
-    )
+    chain = fit.session.chain((Accepted(term, coefficients, inner),), fit.drivers)
+    problem = replace(fit.problem, chain=chain, sizes=sizes, known=Evaluations())
     wider = block_diag(fit.covariance, np.zeros((len(own), len(own))))
     return replace(fit, problem=problem, values=np.concatenate([fit.geometry, own]), covariance=wider)
 

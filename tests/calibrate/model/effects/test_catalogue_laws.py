@@ -162,7 +162,7 @@ def test_measured_readings_change_no_driver(fitted):
         for m in session.measured
     )
     other = replace(session, weighting=replace(session.weighting, measured=shaken))
-    again = replace(fitted, session=other, problem=replace(problem, session=other, last={}))
+    again = replace(fitted, session=other, problem=problem.of_session(other))
     for a, b in zip(terms_of(fitted.drivers), terms_of(again.drivers), strict=True):
         assert a.key == b.key
         assert np.array_equal(a.basis(fitted.drivers, middle_of(a)), b.basis(again.drivers, middle_of(b))), a.key

@@ -19,8 +19,9 @@ from calibrate.model.sensors.catalogue import (
 from calibrate.model.sensors.kind import Trait
 from tests.support.trees import tree_of
 
-ROOT = Path(sensors.__file__).parents[2]
-OWN = ROOT / "calibrate" / "sensors"
+ROOT = Path(sensors.__file__).parents[3]
+MODEL = ROOT / "calibrate" / "model"
+OWN = ("sensors", "optics", "placement")  # folders of sensors and of what they are made of
 # Why a file may spell a sensor's name.
 SPELLED = {
     "calibeam/prove": "families of the simulator's scenarios, which have the proof's own names",
@@ -38,7 +39,7 @@ TESTED: dict[str, str] = {}
 
 def product_files():
     files = [path for top in ("calibrate", "calibeam") for path in sorted((ROOT / top).rglob("*.py"))]
-    return [path for path in files if OWN not in path.parents]
+    return [path for path in files if not any(MODEL / own in path.parents for own in OWN)]
 
 
 def excused(path, reasons):
@@ -47,8 +48,8 @@ def excused(path, reasons):
 
 def sensor_classes():
     found = set()
-    for path in OWN.glob("*.py"):
-        module = __import__(f"calibrate.model.sensors.{path.stem}", fromlist=["_"])
+    for path in (path for own in OWN for path in (MODEL / own).glob("*.py")):
+        module = __import__(f"calibrate.model.{path.parent.name}.{path.stem}", fromlist=["_"])
         found |= {name for name, cls in inspect.getmembers(module, inspect.isclass) if issubclass(cls, Usage)}
     return found - {"Usage"}
 

@@ -27,6 +27,7 @@ from calibrate.model.effects.curve import curve
 from calibrate.model.effects.ports import Place
 from calibrate.model.effects.term import Accepted
 from calibrate.model.sensors.catalogue import BY_NAME
+from calibrate.model.with_effects.chain import Evaluations
 from simulators.conceal.case import conceal
 from simulators.conceal.case_files import write_case
 from simulators.conceal.wanted import Wanted
@@ -47,9 +48,8 @@ def with_one(fit, port, component):
     term = curve(port, component, ("q2",), WAVES)
     one = Accepted(term, np.array([PLAIN, -0.5 * PLAIN, 0.25 * PLAIN]), np.zeros(0))
     sizes = (np.full(WAVES, PLAIN),)
-    problem = replace(
-        fit.problem, terms=(one,), drivers=fit.drivers, sizes=sizes, last={}, slopes={}, kept=[], added={}
-    )
+    chain = fit.session.chain((one,), fit.drivers)
+    problem = replace(fit.problem, chain=chain, sizes=sizes, known=Evaluations())
     wider = block_diag(fit.covariance, np.zeros((WAVES, WAVES)))
     return replace(fit, problem=problem, values=np.concatenate([fit.geometry, one.coefficients]), covariance=wider)
 
