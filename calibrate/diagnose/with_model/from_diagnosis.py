@@ -81,8 +81,6 @@ Ints = NDArray[np.intp]
 
 SOFTWARE = f"calibeam {version('calibeam')}"
 CUT = 0.99
-STEP = 1e-6  # m, rad or a factor
-INNER_STEP = 1e-2  # of a plausible size, of what enters non-linearly
 LEAST_CURVED = 0.1  # of a t law: with more outlying rows than good ones nothing is known
 LEAST_VARIANCE = 1e-6  # of the assumed one, of a source that is not there
 SAME_VARIANCE = 1e-3  # of itself, 0.05 % of a sigma
@@ -226,30 +224,21 @@ def _parameters(fit: Fitted, names: tuple[str, ...]) -> tuple[Parameter, ...]:
 
 
 def _covariance(fit: Fitted) -> Floats:
-    """(value, value) posterior, from difference quotients at the very values of the model.
+    """(value, value) posterior, by derivatives at the very values of the model.
 
     Where base and fixture stand together, or a joint's zero beside what is mounted on it, is held by wide priors only.
-    A prediction is free of that as far as its derivative is that of the covariance; the derivative that the fit takes
-    leaves out how effects turn what geometry does (1e-5 of it, and metres of it are not known).
+    A prediction is free of that as far as its derivative is that of the covariance: none that were kept from values
+    nearby serve here (1e-5 of them, and metres of such a combination are not known).
     """
     parameters = fit.problem.parameters
     free, scale, belief = np.flatnonzero([p.free for p in parameters]), plausible_sizes(parameters), priors(parameters)
-    columns = [_slope(fit, int(i), float(scale[i])) * scale[i] for i in free]
+    slope = fit.problem.forgetting().jacobian(fit.values)[:, free] * scale[free]
     beliefs = np.diag(np.where(np.isfinite(belief[free]), scale[free] / belief[free], 0.0))
-    _, s, Vt = np.linalg.svd(np.concatenate([np.stack(columns, axis=1), beliefs]), full_matrices=False)
+    _, s, Vt = np.linalg.svd(np.concatenate([slope, beliefs]), full_matrices=False)
     root = scale[free, None] * Vt.T / s
     out = np.zeros((len(parameters), len(parameters)))
     out[np.ix_(free, free)] = root @ root.T / max(curvature_of(fit.rows), LEAST_CURVED)
     return out
-
-
-def _slope(fit: Fitted, i: int, plausible: float) -> Floats:
-    """(row,) of the whitened residual by one value."""
-    inner = fit.problem.owner[i] >= 0 and ".c" not in fit.problem.parameters[i].name
-    step = INNER_STEP * plausible if inner else min(STEP, plausible)
-    up, down = fit.values.copy(), fit.values.copy()
-    up[i], down[i] = up[i] + step, down[i] - step
-    return np.asarray((fit.problem.residual(up) - fit.problem.residual(down)) / (2.0 * step), dtype=np.float64)
 
 
 def _seen(fit: Fitted, names: tuple[str, ...]) -> Identifiability:
