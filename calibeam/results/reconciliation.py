@@ -11,6 +11,7 @@ from pathlib import Path
 
 import msgspec
 import numpy as np
+from calibrate.model.placement import TARGETS
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
@@ -34,7 +35,6 @@ from calibrate.diagnose.with_model import model_of_diagnosis, model_of_fit
 from calibrate.errors import DataError
 from calibrate.fit.fit_plan import FitPlan
 from calibrate.model.model_file import ModelFile
-from calibrate.model.placement import TARGETS
 from calibrate.model.sensors import (
     full_pose,
     position,

@@ -7,6 +7,7 @@ where a link starts, at the foot of the offset d, so that a link that bends or g
 from collections.abc import Mapping
 
 import numpy as np
+from calibrate.model.placement import AXES, Device
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
@@ -16,7 +17,6 @@ from acquisition.recording.rig import ArmModel, Rig
 from acquisition.recording.samples import BAR, SEAT, TARGET
 from calibrate.errors import DataError
 from calibrate.model.arms.catalogue import arm_of
-from calibrate.model.placement import AXES, Device
 from calibrate.model.predict import Predictor
 from calibrate.model.rigid import transform
 from calibrate.model.sensors.bar import bar_pairs

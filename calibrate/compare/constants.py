@@ -18,7 +18,7 @@ from calibrate.model.effects.since_model import RECORDING
 from calibrate.model.effects.term import Shape
 from calibrate.model.optics import GAINS
 from calibrate.model.parameters import Parameter, plausible_sizes
-from calibrate.model.placement import target
+from calibrate.model.placement import TARGETS
 from calibrate.model.sensors import seat
 
 Floats = NDArray[np.float64]
@@ -31,7 +31,7 @@ TURNS = ("roll", "pitch", "yaw")
 # Owner of parameters -> port and physics, as of a diagnosis beside a model (calibrate/model/effects/since_model.py).
 FRAMES = {
     "tool": ("tool.point", "tool-moved"),
-    target.TARGETS: ("tool.point", "tool-moved"),
+    TARGETS: ("tool.point", "tool-moved"),
     "laser": ("laser.direction", "laser-moved"),
     "placement": ("fixture.pose", "fixture-moved"),
     seat.POINTS: ("seat.position", "seat-moved"),

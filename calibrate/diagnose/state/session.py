@@ -28,8 +28,8 @@ from calibrate.model.effects.drivers import (
     temperatures_of,
     uncoupled_samples,
 )
-from calibrate.model.measured import Measured
 from calibrate.model.parameters import Parameter
+from calibrate.model.problem import Measured
 from calibrate.model.sensors.catalogue import SENSORS, names_with
 from calibrate.model.sensors.kind import Trait
 from calibrate.model.with_effects.driver_values import readout_at

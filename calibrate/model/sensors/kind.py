@@ -14,14 +14,12 @@ from numpy.typing import NDArray
 
 from acquisition.recording import Samples
 from acquisition.recording.rig import Rig
-from calibrate.model.checks.gross_error import Blunder
-from calibrate.model.checks.shots import Shots
+from calibrate.model.chain import Sensor
+from calibrate.model.checks.gross_error import Blunder, Shots
 from calibrate.model.checks.witness import Witness
-from calibrate.model.measured import Measured
 from calibrate.model.parameters import Parameter
-from calibrate.model.problem import Block
+from calibrate.model.problem import Block, Measured
 from calibrate.model.sample_table import SampleTable
-from calibrate.model.sensor_model import Sensor
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -7,13 +7,13 @@ from numpy.typing import NDArray
 
 from acquisition.recording import Samples
 from acquisition.recording.rig import Rig
+from calibrate.model.chain import Standing, Used
 from calibrate.model.effects.drivers import (
     Drivers,
     Readout,
     conditions_of,
     uncoupled_samples,
 )
-from calibrate.model.sensor_model import Standing, Used
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

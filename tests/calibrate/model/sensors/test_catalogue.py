@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from calibrate.model import sensors
-from calibrate.model.sensor_model import Usage
+from calibrate.model.chain import Usage
 from calibrate.model.sensors.catalogue import (
     BY_NAME,
     SENSORS,
