@@ -45,8 +45,7 @@ from calibrate.diagnose.state import Assumed, Fitted, Session, fit_geometry
 from calibrate.diagnose.with_model import ANEW, Known
 from calibrate.errors import DataError
 from calibrate.fit.identify.session import about_of
-from calibrate.model.effects.moved import SIX
-from calibrate.model.effects.since_model import RECORDING
+from calibrate.model.effects.moved import RECORDING, SIX
 from calibrate.model.effects.term import Size, Term
 from calibrate.model.model_file import ModelFile
 from calibrate.model.parameters import Parameter, plausible_sizes, start_values

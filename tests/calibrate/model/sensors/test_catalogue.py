@@ -19,8 +19,8 @@ from calibrate.model.sensors.catalogue import (
 from calibrate.model.sensors.kind import Trait
 from tests.support.trees import tree_of
 
-ROOT = Path(sensors.__file__).parents[2]
-OWN = ROOT / "calibrate" / "sensors"
+ROOT = Path(sensors.__file__).parents[3]
+OWN = ROOT / "calibrate" / "model" / "sensors"
 # Why a file may spell a sensor's name.
 SPELLED = {
     "calibeam/prove": "families of the simulator's scenarios, which have the proof's own names",
