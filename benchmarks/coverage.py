@@ -11,14 +11,12 @@ from acquisition.recording.rig import load_rig
 from benchmarks.drawn_sessions import POSITION_SIGMA_M, SPOT_SIGMA_M, T_BASE_DEVICE, TARGET_M, Bench, Session
 from benchmarks.intervals import intervals
 from calibrate.fit.rank.identifiability import Identifiability, analyse
-from calibrate.fit.rank.redundant import reduced
-from calibrate.fit.rank.unseen_along import analyse_along
+from calibrate.fit.rank.observability import analyse_along, reduced
 from calibrate.fit.solvers import NEAR_START, Fit, solve
 from calibrate.model.arms.catalogue import arm_of
 from calibrate.model.chain import Chain
 from calibrate.model.dual_psd_rig import dual_psd_chain
-from calibrate.model.placement.device import Device
-from calibrate.model.placement.target import Target
+from calibrate.model.placement import Device, Target
 from calibrate.model.problem import Problem
 from calibrate.model.rigid import transform
 from calibrate.model.sensors.position import Position

@@ -37,7 +37,7 @@ from calibrate.design.design import Asked, design
 from calibrate.design.exchange import CRITERIA
 from calibrate.design.information import Information, information_of
 from calibrate.fit.fit_plan import FitPlan
-from calibrate.model.assumed_rig.assumed_arm import believed_arm
+from calibrate.model.assumed_rig import believed_arm
 from drivers.clock import SystemClock
 from simulators.world.truth import Truth
 from tests.support.direct_bench import direct_bench

@@ -12,7 +12,7 @@ from acquisition.centring.aim import BeamTarget, flange_for, reach
 from acquisition.recording.rig import Rig
 from acquisition.wires.psd_view import PsdView
 from calibeam.live.feed import Feed
-from calibrate.model.assumed_rig.assumed_rig import BelievedRig
+from calibrate.model.assumed_rig import BelievedRig
 from drivers.clock import Clock
 from drivers.device import Block
 from drivers.psd_daq.messages import Flag

@@ -28,7 +28,7 @@ from calibrate.fit.identify.identify import identify
 from calibrate.fit.identify.rounds import coarse_start, settled_fit
 from calibrate.fit.identify.session import instruments_for_fit
 from calibrate.fit.rank.identifiability import analyse
-from calibrate.fit.rank.redundant import reduced
+from calibrate.fit.rank.observability import reduced
 from calibrate.fit.solvers import NEAR_START, Fit, solve
 from calibrate.model.arms import compiled
 from calibrate.model.arms.catalogue import arm_of
@@ -36,8 +36,7 @@ from calibrate.model.arms.serial import SerialArm
 from calibrate.model.chain import Chain
 from calibrate.model.observations import Observations
 from calibrate.model.parameters import hold, plausible_sizes
-from calibrate.model.placement.device import Device
-from calibrate.model.placement.target import Target
+from calibrate.model.placement import Device, Target
 from calibrate.model.problem import Problem
 from calibrate.model.rigid import cross_matrix
 from calibrate.model.sensors.position import Position

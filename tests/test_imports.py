@@ -31,7 +31,7 @@ def test_calibrate_loads_no_library_of_a_wire() -> None:
     """A fit runs where no port, bus or socket library is installed."""
     script = (
         "import sys, calibrate.fit.identify.identify, calibrate.fit.identify.point_constraint, "
-        "calibrate.model.dual_psd_rig, calibrate.model.read_samples, acquisition.recording.mcap.read\n"
+        "calibrate.model.dual_psd_rig, calibrate.model.observations, acquisition.recording.mcap.read\n"
         f"print([name for name in {WIRE_LIBRARIES!r} if name in sys.modules])"
     )
     result = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=60, check=True)

@@ -10,7 +10,7 @@ FOLDERS = ("drivers", "acquisition", "calibrate", "calibeam")  # simulators have
 SOLVED = {"solve", "lstsq", "pinv", "inv"}
 JOINT_STEPS = {
     "acquisition/motion/inverse/solve.py": "to flange poses, and to places of a point: the inverse kinematics",
-    "calibrate/model/observation_model.py": "to readings of any instrument, which calibrate may not ask of acquisition",
+    "calibrate/model/chain.py": "to readings of any instrument, which calibrate may not ask of acquisition",
     "acquisition/centring/search.py": "two linear steps of a beam, and moves of the arm between looks at its spots",
     "acquisition/centring/registered.py": "uphill in the grip of the servo, while the beam is held",
     "calibrate/compare/corrected.py": "one linear step for each pose of a pair",

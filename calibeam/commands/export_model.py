@@ -6,8 +6,8 @@ from acquisition.recording.rig import ArmModel, parse_rig
 from calibeam.overwriting import writes
 from calibrate.apply.export import FormName, export_model, form_named
 from calibrate.errors import DataError
-from calibrate.model.converted_rig import rig_in_model
 from calibrate.model.model_file import read_model
+from calibrate.model.predict import rig_in_model
 
 
 @writes("out")

@@ -21,7 +21,7 @@ from calibeam.results.identification import (
 )
 from calibrate.apply.export import ExportForm, FormName, export_model, form_named
 from calibrate.errors import DataError
-from calibrate.fit.identify.planned import rig_as_planned
+from calibrate.fit.identify.session import rig_as_planned
 from calibrate.fit.solvers import Status
 from calibrate.model.model_file import (
     MODEL,

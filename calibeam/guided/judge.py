@@ -14,9 +14,9 @@ from acquisition.recording.rig import Rig, Tolerance
 from calibeam.guided.refit import LIMIT_SIGMAS, Refit, assumed_prior, refit_arm, visits_of
 from calibrate.model.arms.catalogue import arm_of
 from calibrate.model.arms.eccentric import with_discs
+from calibrate.model.chain import KinematicModel
 from calibrate.model.default_tolerance import SCALELESS
 from calibrate.model.dual_psd_rig import believed_noise
-from calibrate.model.kinematic_model import KinematicModel
 from calibrate.model.parameters import values_by_name
 from calibrate.model.rigid import cross_matrix
 from calibrate.model.sensors.seat import SEAT_BELIEVED_M

@@ -12,8 +12,8 @@ from calibeam.console import Console
 from calibrate.apply.export import cells, nominal_table
 from calibrate.fit.fit_plan import ZEROS_ONLY_COMMAND
 from calibrate.fit.identify.estimates import ONLY_BELIEVED, JointZero
-from calibrate.fit.identify.evidence_record import parameter_records
 from calibrate.fit.identify.point_constraint import PointConstraints
+from calibrate.fit.identify.record import parameter_records
 from calibrate.fit.identify.result import (
     Evidence,
     FreeSpace,

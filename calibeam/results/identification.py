@@ -31,8 +31,8 @@ from calibrate.fit.identify.identify import identify
 from calibrate.fit.identify.record import record_of
 from calibrate.fit.identify.result import Identification
 from calibrate.fit.solvers import Status
-from calibrate.model.converted_rig import rig_in_model
 from calibrate.model.model_file import ModelFile, RigIdentity, write_model
+from calibrate.model.predict import rig_in_model
 from calibrate.report.elements.verdict import Verdict
 from calibrate.report.evidence import session_evidence, session_verdict
 

@@ -34,8 +34,8 @@ from calibrate.fit.rank import Identifiability, analyse
 from calibrate.fit.solvers import Status
 from calibrate.model.arms.catalogue import arm_of
 from calibrate.model.assumed_rig import BelievedRig
+from calibrate.model.observations import SIGMA_COLUMNS
 from calibrate.model.parameters import index_of, priors, start_values
-from calibrate.model.read_samples import SIGMA_COLUMNS
 
 Floats = NDArray[np.float64]
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from calibeam.simulation.rig_in_numbers import arm_in_numbers, beyond_m, light_of
 from calibrate.errors import DataError
 from calibrate.model.effect_records import Effect
-from calibrate.model.effects.causes import cause
+from calibrate.model.effects.curve import cause
 from calibrate.model.effects.drivers import Drivers
 from calibrate.model.effects.gravity import likely_torque_nm
 from calibrate.model.effects.ports import Place, Port

@@ -11,11 +11,11 @@ from calibeam.simulation.of_arm import NOWHERE, displaced, size_and_direction
 from calibrate.model.effects.laser_pointing import (
     beam_axes,
 )
+from calibrate.model.effects.moved import (
+    line_of,
+)
 from calibrate.model.effects.ports import (
     Place,
-)
-from calibrate.model.effects.since_model import (
-    line_of,
 )
 from calibrate.model.effects.tool_sag import (
     PAIRS,

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from acquisition.recording import Samples
 from acquisition.recording.samples import SEAT
-from calibrate.model.effects.drivers import conditions_of, temperatures_of
+from calibrate.model.effects.conditions import conditions_of, temperatures_of
 from calibrate.model.model_file import ModelFile
 from simulators.defects import Scene
 

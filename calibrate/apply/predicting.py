@@ -23,7 +23,6 @@ from acquisition.recording import Samples
 from calibrate.errors import DataError
 from calibrate.fit.weighting import Weighting
 from calibrate.model.effects.ports import Perturbation, Port
-from calibrate.model.measured import Measured
 from calibrate.model.model_file import ModelFile
 from calibrate.model.predict import (
     Columns,
@@ -32,6 +31,7 @@ from calibrate.model.predict import (
     readings,
     residuals,
 )
+from calibrate.model.problem import Measured
 from calibrate.model.rigid import cross_matrix, inverse, transform
 from calibrate.model.sensors.catalogue import kind_of
 from calibrate.model.with_effects.acting import (

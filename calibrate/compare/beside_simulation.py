@@ -45,12 +45,11 @@ from calibrate.diagnose.state import Assumed, Fitted, Session, fit_geometry
 from calibrate.diagnose.with_model import ANEW, Known
 from calibrate.errors import DataError
 from calibrate.fit.identify.session import about_of
-from calibrate.model.effects.moved import SIX
-from calibrate.model.effects.since_model import RECORDING
+from calibrate.model.effects.moved import RECORDING, SIX
 from calibrate.model.effects.term import Size, Term
 from calibrate.model.model_file import ModelFile
 from calibrate.model.parameters import Parameter, plausible_sizes, start_values
-from calibrate.model.placement import target
+from calibrate.model.placement import TARGETS
 from calibrate.model.predict import Predictor, predict
 from calibrate.model.rigid import inverse
 from calibrate.model.sensors import seat, wire
@@ -307,7 +306,7 @@ def _values(simulated: Simulated, session: Session) -> Floats:
     for i, p in enumerate(session.parameters):
         what, _, axis = p.name.partition(".")
         out[i] = values.get(p.name, out[i])
-        if axis in AXES and what in there and what in here and what.startswith(("tool", target.TARGETS, seat.POINTS)):
+        if axis in AXES and what in there and what in here and what.startswith(("tool", TARGETS, seat.POINTS)):
             out[i] += there[what][AXES.index(axis)] - here[what][AXES.index(axis)]
     return out
 

@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 
 from calibrate.diagnose.doubts import Named
 from calibrate.diagnose.state import Fitted, blind
-from calibrate.model.effects.since_model import RECORDING
+from calibrate.model.effects.moved import RECORDING
 from calibrate.model.effects.term import Shape
 from calibrate.model.optics import GAINS
 from calibrate.model.parameters import Parameter, plausible_sizes
-from calibrate.model.placement import target
+from calibrate.model.placement import TARGETS
 from calibrate.model.sensors import seat
 
 Floats = NDArray[np.float64]
@@ -28,10 +28,10 @@ ZERO = "joint-zero-moved"
 LINK = "link-changed"
 AXES = ("x", "y", "z")
 TURNS = ("roll", "pitch", "yaw")
-# Owner of parameters -> port and physics, as of a diagnosis beside a model (calibrate/model/effects/since_model.py).
+# Owner of parameters -> port and physics, as of a diagnosis beside a model (calibrate/model/effects/moved.py).
 FRAMES = {
     "tool": ("tool.point", "tool-moved"),
-    target.TARGETS: ("tool.point", "tool-moved"),
+    TARGETS: ("tool.point", "tool-moved"),
     "laser": ("laser.direction", "laser-moved"),
     "placement": ("fixture.pose", "fixture-moved"),
     seat.POINTS: ("seat.position", "seat-moved"),

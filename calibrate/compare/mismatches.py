@@ -18,7 +18,7 @@ from calibrate.compare.corrected import Simulated
 from calibrate.diagnose.doubts import Finding, Named, named
 from calibrate.diagnose.search import Bench, sizes_of
 from calibrate.diagnose.state import Fitted
-from calibrate.model.effects.since_model import RECORDING
+from calibrate.model.effects.moved import RECORDING
 from calibrate.model.effects.term import Accepted, Size, with_sigma
 
 Floats = NDArray[np.float64]

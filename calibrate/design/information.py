@@ -1,7 +1,7 @@
 """The information in every candidate pose about the unknowns, and the error over the workspace that it leaves.
 
 Information: whitened rows of the readings, in unknowns divided by their prior sigma, so that what is known before any
-data is the unit matrix. The error over the workspace is that of calibrate/fit/accuracy/free_space.py: J C J' over the
+data is the unit matrix. The error over the workspace is that of calibrate/fit/accuracy.py: J C J' over the
 workspace, rigid motions taken out.
 
 The target is what has to be right over the workspace: the tool's point where a rig names one, else the beam of its
@@ -22,8 +22,8 @@ from calibrate.fit.identify.session import instruments_for_fit
 from calibrate.fit.rank import STRUCTURAL
 from calibrate.model.arms.catalogue import arm_of
 from calibrate.model.arms.rig_arm import limits_of
+from calibrate.model.chain import KinematicModel
 from calibrate.model.dual_psd_rig import laser_of
-from calibrate.model.kinematic_model import KinematicModel
 from calibrate.model.parameters import Parameter, index_of, priors
 from calibrate.model.rigid import cross_matrix
 

@@ -38,11 +38,10 @@ from calibrate.diagnose.stages import (
 from calibrate.diagnose.state.fitted import Fitted, fit_geometry
 from calibrate.diagnose.state.session import Session, session_of
 from calibrate.fit.identify.session import columns_of
-from calibrate.model.checks.gross_error import Blunder, BlunderKind
-from calibrate.model.checks.same_posture import err_alike, postures
+from calibrate.model.checks.gross_error import Blunder, BlunderKind, err_alike, postures
 from calibrate.model.effects.catalogue import missing_of
 from calibrate.model.effects.term import Missing
-from calibrate.model.measured import Measured
+from calibrate.model.problem import Measured
 from calibrate.model.sensors.encoder_difference import NAME as ENCODER_DIFFERENCE
 
 Floats = NDArray[np.float64]

@@ -27,15 +27,12 @@ from calibrate.fit.identify.rounds import distances, wary_fit
 from calibrate.fit.identify.session import columns_of, shots_of
 from calibrate.model.alignment import rigid_motion
 from calibrate.model.arms.catalogue import arm_of
-from calibrate.model.checks.gross_error import Blunder, BlunderKind
-from calibrate.model.checks.other_session import sessions_apart
-from calibrate.model.checks.rough_fit import rough_fit
-from calibrate.model.checks.same_posture import err_alike, postures
-from calibrate.model.checks.shots import Shots
+from calibrate.model.checks.gross_error import Blunder, BlunderKind, Shots, err_alike, postures
+from calibrate.model.checks.rough_fit import rough_fit, sessions_apart
 from calibrate.model.checks.witness import by_target
 from calibrate.model.effects.moved import LIMIT
-from calibrate.model.measured import Measured
 from calibrate.model.parameters import start_values
+from calibrate.model.problem import Measured
 from calibrate.model.sensors.catalogue import kind_of
 from calibrate.model.sensors.encoder_difference import NAME as ENCODER_DIFFERENCE
 

@@ -7,8 +7,7 @@ moves rows that follow one another. So only few, single rows behind a gap are gr
 import numpy as np
 from numpy.typing import NDArray
 
-from calibrate.model.checks.gross_error import runs_of
-from calibrate.model.checks.shots import LIMIT, outlying, robust_scale
+from calibrate.model.checks.gross_error import LIMIT, outlying, robust_scale, runs_of
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]

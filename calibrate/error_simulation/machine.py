@@ -22,8 +22,8 @@ from acquisition.recording.rig import Rig
 from calibrate.error_simulation.sources import Law, Source
 from calibrate.model.arms.compiled import PER_PART, perturbed_points
 from calibrate.model.arms.rig_arm import RigArm
-from calibrate.model.converted_rig import rig_of_model
 from calibrate.model.model_file import ModelFile
+from calibrate.model.predict import rig_of_model
 from calibrate.model.rigid import cross
 
 Floats = NDArray[np.float64]

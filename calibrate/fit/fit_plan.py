@@ -15,7 +15,7 @@ from acquisition.recording.files.bounds import Count, Few, Name, Positive
 from acquisition.recording.rig import ArmModel
 from calibrate.errors import DataError
 from calibrate.fit.held_out.splits import SplitKind
-from calibrate.fit.rank.redundant import Redundant
+from calibrate.fit.rank.observability import Redundant
 from calibrate.fit.solvers import DogLegRules, Loss, Method
 from calibrate.model.sensors.catalogue import BY_NAME, SENSORS, names_with
 from calibrate.model.sensors.kind import Trait
@@ -63,7 +63,7 @@ class BesideName(enum.Enum):
 
 
 class DogLeg(Struct, frozen=True, forbid_unknown_fields=True):
-    """The numbers of Dog-Leg (calibrate/fit/solvers/dogleg.py), each absent one as it is without a plan."""
+    """The numbers of Dog-Leg (calibrate/fit/solvers/trust_region.py), each absent one as it is without a plan."""
 
     e1: Limit = DogLegRules.e1
     e2: Limit = DogLegRules.e2

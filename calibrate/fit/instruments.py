@@ -19,11 +19,11 @@ from calibrate.errors import DataError
 from calibrate.fit.weighting import Weighting
 from calibrate.model.alignment import Alignment
 from calibrate.model.arms.catalogue import arm_of
+from calibrate.model.chain import KinematicModel
 from calibrate.model.dual_psd_rig import believed_noise
-from calibrate.model.kinematic_model import KinematicModel
-from calibrate.model.measured import Measured
+from calibrate.model.observations import Angles
 from calibrate.model.parameters import start_values
-from calibrate.model.read_samples import Angles
+from calibrate.model.problem import Measured
 from calibrate.model.rigid import inverse
 from calibrate.model.sample_table import SampleTable
 from calibrate.model.sensors.catalogue import SENSORS, used_with

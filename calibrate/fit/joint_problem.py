@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibrate.errors import DataError
-from calibrate.fit.noise.shared_scatter import SharedScatter
+from calibrate.fit.noise.scatter import SharedScatter
 from calibrate.model.parameters import Parameter
 from calibrate.model.problem import Block, Problem
 from calibrate.model.unknowns import Unknowns

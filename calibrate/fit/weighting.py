@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from calibrate.errors import naming_undetermined
 from calibrate.fit.joint_problem import JointProblem, Witnessed
 from calibrate.fit.noise import variance
-from calibrate.fit.noise.shared_scatter import (
+from calibrate.fit.noise.scatter import (
     Lever,
     SharedScatter,
     levers_of,
@@ -32,9 +32,8 @@ from calibrate.fit.noise.variance import (
     as_believed,
     covariance_of,
 )
-from calibrate.model.measured import Measured
 from calibrate.model.parameters import Parameter, priors, start_values
-from calibrate.model.problem import Block, Problem
+from calibrate.model.problem import Block, Measured, Problem
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]

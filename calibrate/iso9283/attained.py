@@ -24,7 +24,7 @@ from calibrate.fit.held_out import CLOSE_RAD, same_poses
 from calibrate.iso9283.performance import AttainedPoses, PoseTest, performance_of
 from calibrate.model.alignment import rigid_motion
 from calibrate.model.arms.rig_arm import RigArm
-from calibrate.model.effects.drivers import moves_of
+from calibrate.model.effects.conditions import moves_of
 from calibrate.model.model_file import ModelFile
 from calibrate.model.predict import Predictor
 from calibrate.model.rigid import inverse, transform

@@ -12,19 +12,17 @@ from acquisition.recording.rig import Rig
 from acquisition.recording.samples import POSITION, TARGET
 from calibrate.errors import DataError
 from calibrate.model.alignment import Alignment, align, align_with_tool
-from calibrate.model.kinematic_model import KinematicModel
-from calibrate.model.measured import Measured
-from calibrate.model.observation_model import ObservationModel
+from calibrate.model.chain import KinematicModel, ObservationModel
+from calibrate.model.observations import Angles
 from calibrate.model.parameters import start_values
-from calibrate.model.placement.device import Device
-from calibrate.model.placement.target import (
+from calibrate.model.placement import (
     UNKNOWN_PLAUSIBLE_M,
+    Device,
     SeveralTargets,
     Target,
     targets_of,
 )
-from calibrate.model.problem import Problem
-from calibrate.model.read_samples import Angles
+from calibrate.model.problem import Measured, Problem
 from calibrate.model.rigid import transform
 
 Floats = NDArray[np.float64]

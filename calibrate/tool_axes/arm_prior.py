@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from calibrate.errors import DataError
 from calibrate.model.arms.link_tolerance import LinkBelief
-from calibrate.model.kinematic_model import KinematicModel
+from calibrate.model.chain import KinematicModel
 from calibrate.model.model_file import ModelFile
 from calibrate.model.parameters import Parameter, index_of, start_values
 from calibrate.model.problem import whitener_of

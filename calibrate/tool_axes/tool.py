@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from calibrate.errors import DataError
 from calibrate.fit.rank import analyse
 from calibrate.fit.solvers import Status
-from calibrate.model.kinematic_model import KinematicModel
+from calibrate.model.chain import KinematicModel
 from calibrate.model.parameters import hold
 from calibrate.model.rigid import cross, inverse
 from calibrate.tool_axes.arm_prior import ArmPrior

@@ -26,8 +26,7 @@ from calibrate.fit.solvers import (
     covariance_of,
     solve,
 )
-from calibrate.model.chain import Chain
-from calibrate.model.kinematic_model import KinematicModel
+from calibrate.model.chain import Chain, KinematicModel
 from calibrate.model.parameters import Parameter, index_of, start_values
 from calibrate.model.placement import UNKNOWN_PLAUSIBLE_M, Device, Target
 from calibrate.model.problem import Problem

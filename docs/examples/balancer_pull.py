@@ -6,9 +6,8 @@ The rig logs its pressure as an extra column `balancer_pa`; this effect gives th
 import numpy as np
 
 from calibrate.model.effects.drivers import Drivers
-from calibrate.model.effects.form import Floats, Form, at_joint
 from calibrate.model.effects.kind import Kind
-from calibrate.model.effects.term import Missing, Shape, Term
+from calibrate.model.effects.term import Floats, Form, Missing, Shape, Term, at_joint
 from calibrate.model.effects.time_laws import varies
 
 COLUMN = "balancer_pa"

@@ -37,7 +37,7 @@ def zero(joint: int, by_rad: float) -> Change:
 
 
 def link(i: int, axes: np.ndarray) -> Change:
-    """Six numbers behind joint i, along and about its axes there: see `calibrate.model.effects.since_model`."""
+    """Six numbers behind joint i, along and about its axes there: see `calibrate.model.effects.moved`."""
 
     def change(rig: TrueRig) -> TrueRig:
         fixed = np.array(rig.arm.fixed)

@@ -13,7 +13,7 @@ from calibrate.diagnose.doubts.diagnosis import (
     Named,
     Unexplained,
 )
-from calibrate.model.effects.causes import is_slow_cause
+from calibrate.model.effects.curve import is_slow_cause
 from calibrate.model.effects.term import Missing, Shape
 
 SMOOTH = (Shape.EXPONENTIAL.value, Shape.LINEAR.value, Shape.SMOOTH.value)  # a step is no matter of warmth

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from calibrate.diagnose.doubts.diagnosis import Pulled
 from calibrate.diagnose.search.bench import Bench
-from calibrate.model.effects.causes import cause
+from calibrate.model.effects.curve import cause
 from calibrate.model.effects.drivers import Drivers
 from calibrate.model.effects.gravity import likely_torque_nm, overturning_nm
 from calibrate.model.effects.term import Accepted

@@ -13,7 +13,7 @@ from calibrate.diagnose.search.bench import Bench
 from calibrate.diagnose.search.proposals import proposals
 from calibrate.diagnose.search.score import Removed, gain_of, scores
 from calibrate.diagnose.search.searching import Key, cause_of, taken
-from calibrate.model.effects.causes import is_slow_cause
+from calibrate.model.effects.curve import is_slow_cause
 from calibrate.model.effects.term import Accepted, Term
 
 Floats = NDArray[np.float64]

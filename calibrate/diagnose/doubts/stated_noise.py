@@ -21,7 +21,7 @@ from calibrate.diagnose.state.fitted import Fitted
 from calibrate.diagnose.state.linearised import Unseen, tame
 from calibrate.diagnose.state.noise_of_fit import freedom
 from calibrate.fit.identify.session import believed_sigma
-from calibrate.model.checks.same_posture import postures
+from calibrate.model.checks.gross_error import postures
 from calibrate.model.effects.term import Missing
 from calibrate.model.sensors.catalogue import kind_of
 from calibrate.model.sensors.encoder_difference import NAME as ENCODER_DIFFERENCE

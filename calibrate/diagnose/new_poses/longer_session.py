@@ -21,11 +21,10 @@ from calibrate.errors import DataError
 from calibrate.fit.noise import SharedScatter, levers_of
 from calibrate.model.effects.catalogue import terms_of
 from calibrate.model.effects.drivers import Drivers
-from calibrate.model.effects.since_model import changes
+from calibrate.model.effects.moved import changes
 from calibrate.model.effects.term import Accepted, Term
-from calibrate.model.measured import Measured
 from calibrate.model.parameters import plausible_sizes, priors
-from calibrate.model.problem import whitener_of
+from calibrate.model.problem import Measured, whitener_of
 from calibrate.model.with_effects.chain import Chain, ChainAt, columns_of
 from calibrate.model.with_effects.new_poses import alike
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from calibrate.diagnose.new_poses.longer_session import NewPoses
 from calibrate.diagnose.state.fitted import Fitted
 from calibrate.model.arms.rig_arm import limits_of
-from calibrate.model.observation_model import ObservationModel
+from calibrate.model.chain import ObservationModel
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]

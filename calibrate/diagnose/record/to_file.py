@@ -50,8 +50,7 @@ from calibrate.diagnose.stages import Incomplete, Stage, Stages
 from calibrate.diagnose.state.fitted import Fitted
 from calibrate.model.checks.gross_error import Blunder
 from calibrate.model.effects.catalogue import EFFECTS
-from calibrate.model.effects.form import Form
-from calibrate.model.effects.term import Size
+from calibrate.model.effects.term import Form, Size
 
 Floats = NDArray[np.float64]
 

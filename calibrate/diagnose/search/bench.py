@@ -26,8 +26,7 @@ from calibrate.diagnose.state.visible import (
     sight_of,
 )
 from calibrate.model.effects.curve import unit
-from calibrate.model.effects.form import at_joint
-from calibrate.model.effects.term import Accepted, Term
+from calibrate.model.effects.term import Accepted, Term, at_joint
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]

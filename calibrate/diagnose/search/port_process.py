@@ -16,9 +16,10 @@ from scipy.sparse import csr_matrix
 
 from calibrate.diagnose.search.bench import Bench
 from calibrate.diagnose.search.score import Removed
-from calibrate.model.effects.causes import acts_at, causes_of
 from calibrate.model.effects.curve import (
     Curve,
+    acts_at,
+    causes_of,
     curve,
     features,
     frequencies,

@@ -11,10 +11,9 @@ from calibrate.diagnose.search.noise_law import noise_law
 from calibrate.diagnose.search.null import DRAWS, Null, null_of
 from calibrate.diagnose.state.linearised import State
 from calibrate.model.effects.curve import Curve
-from calibrate.model.effects.form import Form
 from calibrate.model.effects.ports import Place
 from calibrate.model.effects.second_encoders import placed
-from calibrate.model.effects.term import Shape, Term
+from calibrate.model.effects.term import Form, Shape, Term
 
 Key = tuple[object, ...]
 

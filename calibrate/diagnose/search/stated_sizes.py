@@ -10,9 +10,8 @@ from calibrate.diagnose.search.bench import Bench
 from calibrate.diagnose.search.line_search import telling_times
 from calibrate.diagnose.search.noise_law import curvature_of
 from calibrate.model.effects.drivers import Drivers
-from calibrate.model.effects.form import Form
 from calibrate.model.effects.loads import doubtful_rigs
-from calibrate.model.effects.term import Accepted, Size, Term
+from calibrate.model.effects.term import Accepted, Form, Size, Term
 
 Floats = NDArray[np.float64]
 

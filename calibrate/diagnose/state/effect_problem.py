@@ -56,7 +56,7 @@ class EffectProblem:
         return replace(self, chain=replace(self.chain, drivers=drivers), known=self.known.of_other_drivers())
 
     def of_session(self, session: Session) -> "EffectProblem":
-        """The same effects and weights in a session that believes or has read something else."""
+        """The same effects and weights in a session of other readings or priors."""
         chain = session.chain(self.terms, self.drivers)
         return replace(self, session=session, chain=chain, known=Evaluations())
 

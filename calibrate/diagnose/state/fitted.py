@@ -34,10 +34,9 @@ from calibrate.fit.solvers import (
 )
 from calibrate.model.effects.catalogue import Listed
 from calibrate.model.effects.drivers import Drivers
-from calibrate.model.effects.form import Form
+from calibrate.model.effects.moved import changes
 from calibrate.model.effects.ports import Port
-from calibrate.model.effects.since_model import changes
-from calibrate.model.effects.term import Accepted, Term
+from calibrate.model.effects.term import Accepted, Form, Term
 from calibrate.model.effects.time_laws import FEWEST_AFTER
 from calibrate.model.parameters import (
     Parameter,

@@ -20,17 +20,11 @@ from calibrate.model.arms.catalogue import arm_of
 from calibrate.model.arms.link_tolerance import LinkBelief
 from calibrate.model.arms.serial import SerialArm
 from calibrate.model.default_tolerance import PAIR, SCALELESS, WIDE
-from calibrate.model.effects.drivers import (
-    Conditions,
-    Drivers,
-    Readout,
-    conditions_of,
-    temperatures_of,
-    uncoupled_samples,
-)
+from calibrate.model.effects.conditions import conditions_of, temperatures_of, uncoupled_samples
+from calibrate.model.effects.drivers import Conditions, Drivers, Readout
 from calibrate.model.effects.term import Accepted
-from calibrate.model.measured import Measured
 from calibrate.model.parameters import Parameter
+from calibrate.model.problem import Measured
 from calibrate.model.sensors.catalogue import SENSORS, names_with
 from calibrate.model.sensors.kind import Trait
 from calibrate.model.with_effects.chain import Chain

@@ -18,7 +18,7 @@ from scipy.stats import t as student
 from calibrate.diagnose.streams.between_encoders import Causes
 from calibrate.diagnose.streams.stands import Stand
 from calibrate.diagnose.streams.track import Curve, Track
-from calibrate.model.effects.drivers import MOVED_RAD
+from calibrate.model.effects.conditions import MOVED_RAD
 
 Floats = NDArray[np.float64]
 

@@ -23,8 +23,9 @@ from calibrate.diagnose.state.session import Session
 from calibrate.errors import DataError
 from calibrate.fit.identify.session import about_of
 from calibrate.model.effect_records import Effect
-from calibrate.model.effects.drivers import Drivers, moves_of
-from calibrate.model.effects.since_model import RECORDING
+from calibrate.model.effects.conditions import moves_of
+from calibrate.model.effects.drivers import Drivers
+from calibrate.model.effects.moved import RECORDING
 from calibrate.model.effects.term import Accepted, Shape
 from calibrate.model.model_file import Covariance, ModelFile
 from calibrate.model.parameters import plausible_sizes

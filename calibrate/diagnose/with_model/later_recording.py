@@ -24,8 +24,7 @@ from calibrate.diagnose.with_model.known import Known, term_of, with_structure
 from calibrate.errors import DataError
 from calibrate.model.effect_records import Effect
 from calibrate.model.effects.drivers import Drivers
-from calibrate.model.effects.moved import SIX
-from calibrate.model.effects.since_model import RECORDING
+from calibrate.model.effects.moved import RECORDING, SIX
 from calibrate.model.model_file import ModelFile
 from calibrate.model.sensors import seat
 

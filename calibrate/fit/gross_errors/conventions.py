@@ -13,17 +13,17 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from calibrate.fit.gross_errors import degrees, joint_hypotheses
-from calibrate.fit.gross_errors.hypothesis import Hypothesis
+from calibrate.fit.gross_errors import joint_hypotheses
+from calibrate.fit.gross_errors.joint_hypotheses import Hypothesis
 from calibrate.model.checks.gross_error import Blunder, BlunderKind
-from calibrate.model.checks.least_distance import median
+from calibrate.model.checks.rough_fit import median
 from calibrate.model.checks.witness import Otherwise, Strain, Witness
 
 Floats = NDArray[np.float64]
 Flange = Callable[[Floats], Floats]
 _Trial = tuple[Hypothesis, ...]  # by which the angles are read, one after the other
 
-KNOWN = (degrees.hypotheses, joint_hypotheses.turned, joint_hypotheses.shifted, joint_hypotheses.coupled)
+KNOWN = (joint_hypotheses.in_degrees, joint_hypotheses.turned, joint_hypotheses.shifted, joint_hypotheses.coupled)
 
 GAIN = 4.0  # by which the strain must fall
 RIVAL = 1.5  # times the winner's strain: as good an explanation

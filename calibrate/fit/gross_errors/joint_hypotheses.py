@@ -1,4 +1,7 @@
-"""How a joint may be counted otherwise than the rig has it: another zero, one joint following another, another sign.
+"""By which other conventions the joint angles of a whole file may have been written.
+
+Another zero, one joint following another, another sign, or degrees: far outside the joint limits in many rows, or
+explained only when read as degrees.
 
 Arms with a parallelogram, and some controllers, give joint 3 against the base or the horizontal instead of against link
 2. Source: Siciliano, Sciavicco, Villani, Oriolo, Robotics, 2009, ch. 2.9.2 (parallelogram arm).
@@ -7,16 +10,31 @@ Controllers choose the senses of their joints freely; KUKA counts A1, A4 and A6 
 tables. Where links 2 and 3 move in one plane, these three signs together mirror the arm at that plane.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
 
-from calibrate.fit.gross_errors.hypothesis import Hypothesis
-from calibrate.model.checks.gross_error import BlunderKind
+from calibrate.model.checks.gross_error import Blunder, BlunderKind
 
 Floats = NDArray[np.float64]
+BEYOND = 2.0  # times the farthest joint limit: no arm reads that in radians
+SHARE = 0.1  # of the rows: a single typed digit is not a unit
+REMEDY = "write radians (degrees times pi/180)"
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """What the joint angles would have to be."""
+
+    kind: BlunderKind
+    column: str
+    what: str
+    remedy: str
+    angles: Callable[[Floats], Floats]  # (pose, joint) as written -> as meant, rad
+    signs: tuple[int, ...] = ()  # joints, from 1, whose sign it changes
 
 
 def shifted(n_joints: int) -> Iterator[Hypothesis]:
@@ -53,8 +71,12 @@ def coupled(n_joints: int) -> Iterator[Hypothesis]:
 
 
 EVERY_SET = 8  # joints up to which all sets are tried: 247 of them, in a second
+
+
 # Against the table with every axis drawn as the one before it turns: docs/robots.md, with sources
 TURNED_BY: Mapping[tuple[int, ...], str] = {(1, 4, 6): "KUKA"}
+
+
 LARGEST_SET = 3  # of longer arms; no controller is known that turns more
 
 
@@ -99,3 +121,42 @@ def _turned(joints: tuple[int, ...], n_joints: int) -> Hypothesis:
         lambda q: q * sign,
         joints,
     )
+
+
+def beyond_limits(q_rad: Floats, limits_rad: Floats) -> Blunder | None:
+    """Columns whose angles (pose, joint) cannot be radians between limits (joint, 2); None if all can."""
+    beyond = _columns(q_rad, limits_rad)
+    if len(beyond) == 0:
+        return None
+    j = int(beyond[np.argmax(np.max(np.abs(q_rad[:, beyond]), axis=0))])
+    worst, limit = float(np.max(np.abs(q_rad[:, j]))), float(np.max(np.abs(limits_rad[j])))
+    columns = ", ".join(f"q{k + 1}_rad" for k in beyond)
+    what = f"angles up to {worst:g} beside a limit of {limit:g} rad (q{j + 1}_rad): these are degrees"
+    return Blunder(BlunderKind.DEGREES, (), f"column {columns}", what, REMEDY)
+
+
+def as_radians(q_rad: Floats, limits_rad: Floats) -> Floats:
+    """The same angles read as degrees in the column of `beyond_limits`; in all columns where it is several."""
+    out = q_rad.copy()
+    beyond = _columns(q_rad, limits_rad)
+    every = len(beyond) > 1  # degrees of a joint that moves little can resemble radians
+    out[:, slice(None) if every else beyond] *= np.pi / 180.0
+    return out
+
+
+def _columns(q_rad: Floats, limits_rad: Floats) -> NDArray[np.intp]:
+    """Joints, from 0, whose angles lie far beyond any limit in many rows."""
+    if len(q_rad) == 0:
+        return np.zeros(0, dtype=np.intp)
+    reach = BEYOND * np.max(np.abs(limits_rad), axis=1)
+    return np.flatnonzero(np.mean(np.abs(q_rad) > reach, axis=0) > SHARE)
+
+
+def in_degrees(n_joints: int) -> Iterator[Hypothesis]:
+    """All columns in degrees, or one of them: a small motion in degrees can lie within the limits."""
+    factor = np.pi / 180.0
+    what = "the readings are explained only when the angles are read as degrees"
+    yield Hypothesis(BlunderKind.DEGREES, f"columns q1_rad ... q{n_joints}_rad", what, REMEDY, lambda q: q * factor)
+    for j in range(n_joints):
+        scale = np.where(np.arange(n_joints) == j, factor, 1.0)
+        yield Hypothesis(BlunderKind.DEGREES, f"column q{j + 1}_rad", what, REMEDY, lambda q, s=scale: q * s)

@@ -19,11 +19,11 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from calibrate.fit.estimator import LEAST_SQUARES, Estimator
 from calibrate.fit.held_out.splits import Split
 from calibrate.fit.rank.identifiability import analyse
-from calibrate.fit.rank.redundant import reduced
+from calibrate.fit.rank.observability import reduced
 from calibrate.fit.solvers import Fit, Status
+from calibrate.fit.solvers.solve import LEAST_SQUARES, Estimator
 from calibrate.model.parameters import Parameter, start_values
 from calibrate.model.problem import Block
 

@@ -16,7 +16,7 @@ from scipy.special import ndtr, stdtrit
 
 from acquisition.recording import Samples
 from acquisition.recording.rig import Rig
-from calibrate.fit.accuracy.fit_statistics import (
+from calibrate.fit.accuracy import (
     RepeatNoise,
     against_repeats,
     against_stated,
@@ -30,7 +30,7 @@ from calibrate.fit.identify.estimates import (
     estimate_of,
     untold,
 )
-from calibrate.fit.identify.evidence import Asked, evidence_of, rows_used
+from calibrate.fit.identify.evidence import Asked, evidence_of, lengths, rows_used
 from calibrate.fit.identify.result import (
     FitEnd,
     Identification,
@@ -39,12 +39,11 @@ from calibrate.fit.identify.result import (
 )
 from calibrate.fit.identify.rounds import Fitted
 from calibrate.fit.identify.session import NEGLIGIBLE_RAD, about_of
-from calibrate.fit.identify.unseen_rows import lengths
 from calibrate.fit.noise.variance import VarianceFactors
 from calibrate.fit.rank.identifiability import STRUCTURAL, WEAK, Identifiability
-from calibrate.fit.rank.unseen_along import analyse_along, points_along
+from calibrate.fit.rank.observability import analyse_along, points_along
 from calibrate.fit.solvers import FAR_START, Fit, Status
-from calibrate.fit.solvers.linear import triangle_of
+from calibrate.fit.solvers.least_squares import triangle_of
 from calibrate.fit.weighting import JOINT, Weighting
 from calibrate.model.checks.gross_error import Blunder
 from calibrate.model.parameters import (

@@ -17,26 +17,23 @@ from acquisition.recording.files.bounds import ARM_M
 from acquisition.recording.rig import ArmModel, Rig
 from acquisition.recording.samples import POSITION
 from calibrate.errors import DataError
-from calibrate.fit.estimator import Estimator
 from calibrate.fit.fit_plan import DEFAULT, BesideName, FitPlan
+from calibrate.fit.gross_errors.bad_rows import duplicated_rows, left_alone, rows_beyond_limits
 from calibrate.fit.gross_errors.conventions import wrong_convention, wrong_table
-from calibrate.fit.gross_errors.degrees import as_radians, beyond_limits
-from calibrate.fit.gross_errors.of_the_table import duplicated_rows, left_alone, rows_beyond_limits
-from calibrate.fit.identify.clean import clean, refuse_most, rows_of
-from calibrate.fit.identify.evidence import Asked
+from calibrate.fit.gross_errors.joint_hypotheses import as_radians, beyond_limits
+from calibrate.fit.identify.clean import clean, mirrored_axes, refuse_most, rows_of
+from calibrate.fit.identify.evidence import Asked, Splitting
 from calibrate.fit.identify.fit_report import result_of
-from calibrate.fit.identify.planned import rig_as_planned, samples_as_planned
 from calibrate.fit.identify.point_constraint import point_constraints
 from calibrate.fit.identify.result import Identification
 from calibrate.fit.identify.rounds import coarse_start, settled_fit
-from calibrate.fit.identify.session import instruments_for_fit, standing_at
-from calibrate.fit.identify.spot_signs import mirrored_axes
-from calibrate.fit.identify.unseen_rows import Splitting
+from calibrate.fit.identify.session import instruments_for_fit, rig_as_planned, samples_as_planned, standing_at
 from calibrate.fit.instruments import Instruments
+from calibrate.fit.solvers.solve import Estimator
 from calibrate.fit.weighting import Weighting
 from calibrate.model.arms.catalogue import arm_of
 from calibrate.model.checks.gross_error import Blunder
-from calibrate.model.checks.other_session import sessions_apart
+from calibrate.model.checks.rough_fit import sessions_apart
 from calibrate.model.checks.witness import Witness, by_target
 from calibrate.model.parameters import start_values
 from calibrate.model.sensors.catalogue import witnesses_of

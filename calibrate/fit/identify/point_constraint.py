@@ -27,13 +27,12 @@ from calibrate.fit.identify.estimates import JointZero
 from calibrate.fit.rank.identifiability import Identifiability, analyse
 from calibrate.fit.solvers import Fit, Status, solve
 from calibrate.model.arms.catalogue import arm_of
+from calibrate.model.chain import KinematicModel
 from calibrate.model.default_tolerance import links_of
 from calibrate.model.dual_psd_rig import laser_of
-from calibrate.model.kinematic_model import KinematicModel
-from calibrate.model.observations import Observations
+from calibrate.model.observations import Observations, observations
 from calibrate.model.optics import CENTRED_M, LaserMount, Lines, distances, nearest_point
 from calibrate.model.parameters import Parameter, hold, start_values
-from calibrate.model.read_samples import observations
 from calibrate.model.rigid import cross
 
 Floats = NDArray[np.float64]

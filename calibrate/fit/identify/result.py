@@ -10,8 +10,7 @@ from math import sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from calibrate.fit.accuracy.fit_statistics import Alarm, RepeatNoise, StatedNoise
-from calibrate.fit.accuracy.free_space import FreeSpaceError, Scatter
+from calibrate.fit.accuracy import Alarm, FreeSpaceError, RepeatNoise, Scatter, StatedNoise
 from calibrate.fit.held_out.held_out import Bootstrap
 from calibrate.fit.identify.estimates import Estimate, JointZero, joint_zeros
 from calibrate.fit.identify.point_constraint import PointConstraints

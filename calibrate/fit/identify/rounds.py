@@ -8,11 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from calibrate.fit.estimator import LEAST_SQUARES, Estimator
 from calibrate.fit.joint_problem import JointProblem
 from calibrate.fit.noise.variance import VarianceFactors
 from calibrate.fit.rank.identifiability import Identifiability, analyse
-from calibrate.fit.rank.redundant import Redundant, reduced
+from calibrate.fit.rank.observability import Redundant, reduced
 from calibrate.fit.solvers import (
     FAR_START,
     NEAR_START,
@@ -20,7 +19,8 @@ from calibrate.fit.solvers import (
     Status,
     solve,
 )
-from calibrate.fit.solvers.loss import Loss
+from calibrate.fit.solvers.robust import Loss
+from calibrate.fit.solvers.solve import LEAST_SQUARES, Estimator
 from calibrate.fit.weighting import Weighting
 from calibrate.model.parameters import hold, plausible_sizes
 from calibrate.model.problem import Block, Problem

@@ -2,8 +2,17 @@
 encoders, robust scale. Weights of rows are made of these in calibrate/fit/weighting.py.
 """
 
-from calibrate.fit.noise.scatter import NU, Scatter, likelihood_of, scatter_of, sigma_about_zero
-from calibrate.fit.noise.shared_scatter import SharedScatter, levers_of, shares_found, witness_of
+from calibrate.fit.noise.scatter import (
+    NU,
+    Scatter,
+    SharedScatter,
+    levers_of,
+    likelihood_of,
+    scatter_of,
+    shares_found,
+    sigma_about_zero,
+    witness_of,
+)
 from calibrate.fit.noise.variance import TOLD, VarianceFactors, as_believed
 
 __all__ = [

@@ -12,14 +12,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from calibrate.fit.noise.noisy_rows import (
+from calibrate.fit.noise.restricted_likelihood import (
     FIXED,
     IndependentRows,
     NoisyRows,
+    Score,
     covariance_of,
     independent,
+    score_at,
 )
-from calibrate.fit.noise.restricted_score import Score, score_at
 
 __all__ = ["FIXED", "NoisyRows", "VarianceFactors", "as_believed", "covariance_of", "doubt", "estimate"]
 

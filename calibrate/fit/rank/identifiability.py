@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from calibrate.fit.solvers.linear import triangle_of
+from calibrate.fit.solvers.least_squares import triangle_of
 from calibrate.model.parameters import Parameter, plausible_sizes, priors
 from calibrate.model.sensors.catalogue import FRAMES
 

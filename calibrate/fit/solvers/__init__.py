@@ -1,11 +1,9 @@
-"""The front door to fitting: `solve` with its methods, losses and named endings. One file an algorithm."""
+"""The front door to fitting: `solve` with its methods, losses and named endings. Its algorithms in one room each."""
 
-from calibrate.fit.solvers.dogleg import DogLegRules
-from calibrate.fit.solvers.levenberg import FAR_START, NEAR_START
-from calibrate.fit.solvers.linear import covariance_of, triangle_of
-from calibrate.fit.solvers.loss import Loss, LossKind
-from calibrate.fit.solvers.result import Fit, Status, Stop
+from calibrate.fit.solvers.least_squares import Fit, Status, Stop, covariance_of, triangle_of
+from calibrate.fit.solvers.robust import Loss, LossKind
 from calibrate.fit.solvers.solve import Method, solve
+from calibrate.fit.solvers.trust_region import FAR_START, NEAR_START, DogLegRules
 
 __all__ = [
     "FAR_START",

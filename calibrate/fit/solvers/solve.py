@@ -1,28 +1,29 @@
-"""One interface to every solver: method, loss, start and limits in; values, covariance and a named status out."""
+"""One interface to every solver: method, loss, start and limits in; values, covariance and a named status out.
 
+An `Estimator` keeps method and loss, so that the answer of an identification and its proofs are solved alike.
+"""
+
+from dataclasses import dataclass, replace
 from enum import Enum
 
 import numpy as np
 from numpy.typing import NDArray
 
-from calibrate.fit.solvers.dogleg import DogLegRules, dogleg
-from calibrate.fit.solvers.levenberg import FAR_START, LevenbergRules, levenberg
-from calibrate.fit.solvers.linear import covariance_of, promised_gain
-from calibrate.fit.solvers.loss import Loss, LossKind
-from calibrate.fit.solvers.result import Fit, Status, Stop
+from calibrate.fit.solvers.least_squares import Ended, Fit, Rows, Status, Stop, covariance_of, promised_gain
 from calibrate.fit.solvers.robust import (
+    Loss,
+    LossKind,
     Run,
     reweighted,
     robust_covariance,
     row_weights,
     total_cost,
 )
-from calibrate.fit.solvers.rows import Ended, Rows
+from calibrate.fit.solvers.trust_region import FAR_START, NEAR_START, DogLegRules, LevenbergRules, dogleg, levenberg
 from calibrate.model.parameters import start_values
 from calibrate.model.problem import LeastSquares
 
 Floats = NDArray[np.float64]
-
 STALL = 1e-4  # of chi2, 1 % of a sigma: a slope that promises more than this was not followed to its end
 STALL_SHARE = 1e-8  # of chi2 itself, where residuals are far above the stated noise
 
@@ -120,3 +121,24 @@ def _left_to_gain(rows: Rows, ended: Ended, slope: Floats) -> float:
     active = ~rows.pressed(ended.theta, gradient)
     promised = promised_gain(slope[:, active].T @ slope[:, active], gradient[active])
     return promised - STALL_SHARE * float(ended.residual @ ended.residual)
+
+
+@dataclass(frozen=True)
+class Estimator:
+    """A method with a loss, and with the numbers of Dog-Leg where they are not the usual ones."""
+
+    method: Method = Method.LEVENBERG
+    loss: Loss = Loss.SQUARE
+    rules: DogLegRules | None = None
+
+    @property
+    def with_usual_rules(self) -> "Estimator":
+        """For figures beside the answer, which limits set for the answer must not cut short."""
+        return replace(self, rules=None)
+
+    def fit(self, problem: LeastSquares, start: Floats, damping: float = NEAR_START) -> Fit:
+        """From `start` (param,), by default one known to be good."""
+        return solve(problem, method=self.method, loss=self.loss, start=start, damping=damping, rules=self.rules)
+
+
+LEAST_SQUARES = Estimator()

@@ -5,10 +5,15 @@ from the link in front is what turns the frames; everything that a person or a c
 Source: Siciliano, Sciavicco, Villani, Oriolo, Robotics, 2009, ch. 2.9.2 (arm with parallelogram).
 """
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.recording.rig import Arm
+if TYPE_CHECKING:
+    from acquisition.recording.rig import Arm
 
 Floats = NDArray[np.float64]
 

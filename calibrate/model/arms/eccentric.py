@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.recording.rig import Rig
-from calibrate.model.kinematic_model import KinematicModel
+from calibrate.model.chain import KinematicModel
 from calibrate.model.parameters import Parameter
 
 Floats = NDArray[np.float64]

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from calibrate.model.arms import compiled
 from calibrate.model.arms.coupled_readings import by_readings, uncoupled
-from calibrate.model.kinematic_model import KinematicModel
+from calibrate.model.chain import KinematicModel
 from calibrate.model.parameters import Parameter
 from calibrate.model.rigid import cross_matrix, turn_twist
 

@@ -3,13 +3,11 @@
 import numpy as np
 
 from calibrate.model.effects import time_laws
-from calibrate.model.effects.drivers import Drivers
-from calibrate.model.effects.form import Floats, Form
+from calibrate.model.effects.drivers import Drivers, beyond_end_m, link_vectors
 from calibrate.model.effects.kind import Kind
-from calibrate.model.effects.link_span import beyond_end_m, link_vectors
 from calibrate.model.effects.link_thermal_growth import LIMIT_GROWTH, LIMIT_PER_K
 from calibrate.model.effects.ports import Place, Port
-from calibrate.model.effects.term import Inner, Shape, Term
+from calibrate.model.effects.term import Floats, Form, Inner, Shape, Term
 from calibrate.model.effects.time_laws import Law, varies
 
 

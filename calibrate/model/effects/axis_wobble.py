@@ -2,12 +2,10 @@
 
 import numpy as np
 
-from calibrate.model.effects.drivers import Drivers
-from calibrate.model.effects.form import Floats, Form
+from calibrate.model.effects.drivers import Drivers, beyond_end_m
 from calibrate.model.effects.kind import Kind
-from calibrate.model.effects.link_span import beyond_end_m
 from calibrate.model.effects.ports import Place, Port
-from calibrate.model.effects.term import Shape, Term
+from calibrate.model.effects.term import Floats, Form, Shape, Term
 
 # Cycles in the frame that does not turn; negative turns against the joint. +1 turns with it and is geometry.
 ORDERS = (-1, 2, -2, 3, -3)

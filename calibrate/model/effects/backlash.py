@@ -3,14 +3,16 @@
 import numpy as np
 
 from calibrate.model.effects.drivers import Drivers
-from calibrate.model.effects.form import Floats, Form, at_joint
 from calibrate.model.effects.gravity import likely_torque_nm, loaded, upright
 from calibrate.model.effects.kind import Kind
 from calibrate.model.effects.term import (
+    Floats,
+    Form,
     Inner,
     Missing,
     Shape,
     Term,
+    at_joint,
 )
 from calibrate.model.effects.time_laws import varies
 

@@ -5,12 +5,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from calibrate.model.effects.drivers import Drivers
-from calibrate.model.effects.form import Floats
 from calibrate.model.effects.gravity import overturning_by
 from calibrate.model.effects.kind import Kind
 from calibrate.model.effects.loads import Load, states_masses
 from calibrate.model.effects.ports import Place, Port
-from calibrate.model.effects.term import Missing, Shape, Term
+from calibrate.model.effects.term import Floats, Missing, Shape, Term
 from calibrate.model.effects.weighed import (
     Weighed,
     by_corrected,

@@ -47,11 +47,12 @@ from calibrate.model.effects import (
     tool_sag,
 )
 from calibrate.model.effects.drivers import Drivers
-from calibrate.model.effects.form import Form, Functions
 from calibrate.model.effects.kind import Kind
 from calibrate.model.effects.second_encoders import at_second_encoders
 from calibrate.model.effects.term import (
     Effect,
+    Form,
+    Functions,
     Holds,
     Missing,
     Term,

@@ -3,10 +3,9 @@
 import numpy as np
 
 from calibrate.model.effects.drivers import Drivers
-from calibrate.model.effects.form import Floats, Form, Functions
 from calibrate.model.effects.kind import Kind
 from calibrate.model.effects.ports import Place, Port
-from calibrate.model.effects.term import Inner, Shape, Term
+from calibrate.model.effects.term import Floats, Form, Functions, Inner, Shape, Term
 from calibrate.model.sensors.kind import Trait
 
 SHORTEST_M, LONGEST_M = 0.05, 1.0  # circumference of drums in use

@@ -4,10 +4,9 @@ import numpy as np
 
 from calibrate.model.effects import time_laws
 from calibrate.model.effects.drivers import Drivers
-from calibrate.model.effects.form import Floats, Form
 from calibrate.model.effects.kind import Kind
 from calibrate.model.effects.ports import Place, Port
-from calibrate.model.effects.term import Shape, Term
+from calibrate.model.effects.term import Floats, Form, Shape, Term
 from calibrate.model.effects.time_laws import varies
 from calibrate.model.sensors.kind import Trait
 

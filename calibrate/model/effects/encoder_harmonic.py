@@ -4,9 +4,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibrate.model.effects.drivers import Drivers
-from calibrate.model.effects.form import Form, at_joint
 from calibrate.model.effects.kind import Kind
-from calibrate.model.effects.term import Shape, Term
+from calibrate.model.effects.term import Form, Shape, Term, at_joint
 
 Floats = NDArray[np.float64]
 ORDERS = (2, 3, 4)

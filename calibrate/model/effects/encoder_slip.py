@@ -2,9 +2,8 @@
 
 from calibrate.model.effects import time_laws
 from calibrate.model.effects.drivers import Drivers
-from calibrate.model.effects.form import Form, at_joint
 from calibrate.model.effects.kind import Kind
-from calibrate.model.effects.term import Holds, Shape, Term
+from calibrate.model.effects.term import Form, Holds, Shape, Term, at_joint
 
 LIMIT_RAD = 5e-2
 

@@ -1,9 +1,8 @@
 """Joint scale: a gear ratio entered wrong, or an encoder whose counts are not those stated."""
 
 from calibrate.model.effects.drivers import Drivers
-from calibrate.model.effects.form import Floats, Form, at_joint
 from calibrate.model.effects.kind import Kind
-from calibrate.model.effects.term import Shape, Term
+from calibrate.model.effects.term import Floats, Form, Shape, Term, at_joint
 
 LIMIT_RAD_PER_RAD = 0.05
 

@@ -4,13 +4,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibrate.model.effects.drivers import Drivers
-from calibrate.model.effects.form import Form, at_joint
 from calibrate.model.effects.kind import Kind
 from calibrate.model.effects.term import (
+    Form,
     Inner,
     Missing,
     Shape,
     Term,
+    at_joint,
 )
 
 Floats = NDArray[np.float64]

@@ -3,10 +3,9 @@
 import numpy as np
 
 from calibrate.model.effects.drivers import Drivers
-from calibrate.model.effects.form import Floats, Form, at_joint
 from calibrate.model.effects.gravity import point_of
 from calibrate.model.effects.kind import Kind
-from calibrate.model.effects.term import Shape, Term
+from calibrate.model.effects.term import Floats, Form, Shape, Term, at_joint
 from calibrate.model.rigid import cross
 from calibrate.model.sensors.kind import Trait
 

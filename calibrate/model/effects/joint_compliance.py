@@ -5,15 +5,17 @@ from collections.abc import Sequence
 import numpy as np
 
 from calibrate.model.effects.drivers import Drivers
-from calibrate.model.effects.form import Floats, Form, at_joint
 from calibrate.model.effects.gravity import loaded, stated_torque_nm, torques_nm
 from calibrate.model.effects.kind import Kind
 from calibrate.model.effects.loads import Load
 from calibrate.model.effects.term import (
+    Floats,
+    Form,
     Inner,
     Missing,
     Shape,
     Term,
+    at_joint,
 )
 from calibrate.model.effects.weighed import (
     By,

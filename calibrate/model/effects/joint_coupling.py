@@ -1,9 +1,8 @@
 """Coupled wrist: turning one joint drags another along."""
 
 from calibrate.model.effects.drivers import Drivers
-from calibrate.model.effects.form import Floats, Form, at_joint
 from calibrate.model.effects.kind import Kind
-from calibrate.model.effects.term import Shape, Term
+from calibrate.model.effects.term import Floats, Form, Shape, Term, at_joint
 
 LIMIT_RAD_PER_RAD = 0.2
 REACH = 2  # joints away: nested wrist shafts

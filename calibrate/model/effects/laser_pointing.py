@@ -4,9 +4,8 @@ import numpy as np
 
 from calibrate.model.effects import time_laws
 from calibrate.model.effects.drivers import Drivers
-from calibrate.model.effects.form import Floats, Form
 from calibrate.model.effects.ports import Place, Port
-from calibrate.model.effects.term import Inner, Shape, Term
+from calibrate.model.effects.term import Floats, Form, Inner, Shape, Term
 from calibrate.model.effects.time_laws import Law
 
 LIMIT_RAD = 5e-3  # what a mount that is not loose does; diode modules drift by 5 to 50 µrad (makers' data sheets)

@@ -3,10 +3,9 @@
 import numpy as np
 
 from calibrate.model.effects.drivers import Drivers
-from calibrate.model.effects.form import Floats, Form
 from calibrate.model.effects.kind import Kind
 from calibrate.model.effects.ports import Place, Port
-from calibrate.model.effects.term import Missing, Shape, Term
+from calibrate.model.effects.term import Floats, Form, Missing, Shape, Term
 from calibrate.model.effects.time_laws import varies
 
 LIMIT_S = 0.5

@@ -4,14 +4,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from calibrate.model.effects.drivers import Drivers
-from calibrate.model.effects.form import Floats
+from calibrate.model.effects.drivers import SHORTEST_M, Drivers, beyond_end_m, link_vectors
 from calibrate.model.effects.gravity import bending_nm, weights_n
 from calibrate.model.effects.kind import Kind
-from calibrate.model.effects.link_span import SHORTEST_M, beyond_end_m, link_vectors
 from calibrate.model.effects.loads import Load, carried, states_masses
 from calibrate.model.effects.ports import Place, Port
-from calibrate.model.effects.term import Shape, Term
+from calibrate.model.effects.term import Floats, Shape, Term
 from calibrate.model.effects.time_laws import varies
 from calibrate.model.effects.weighed import (
     By,

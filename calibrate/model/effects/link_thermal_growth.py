@@ -3,12 +3,12 @@
 import numpy as np
 
 from calibrate.model.effects import time_laws
-from calibrate.model.effects.drivers import Drivers
-from calibrate.model.effects.form import Floats, Form
+from calibrate.model.effects.drivers import SHORTEST_M, Drivers, link_vectors
 from calibrate.model.effects.kind import Kind
-from calibrate.model.effects.link_span import SHORTEST_M, link_vectors
 from calibrate.model.effects.ports import Place, Port
 from calibrate.model.effects.term import (
+    Floats,
+    Form,
     Inner,
     Missing,
     Shape,

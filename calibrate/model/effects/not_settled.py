@@ -1,10 +1,9 @@
 """Samples taken before the arm stood: every joint still holds the same share of its last move."""
 
 from calibrate.model.effects.drivers import Drivers
-from calibrate.model.effects.form import Floats, Form
 from calibrate.model.effects.kind import Kind
 from calibrate.model.effects.ports import Place, Port
-from calibrate.model.effects.term import Shape, Term
+from calibrate.model.effects.term import Floats, Form, Shape, Term
 from calibrate.model.effects.time_laws import varies
 
 LIMIT = 0.5

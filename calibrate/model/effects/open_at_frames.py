@@ -4,10 +4,9 @@ import numpy as np
 
 from calibrate.model.effects.curves import SPLINES, centred, splines
 from calibrate.model.effects.drivers import Drivers
-from calibrate.model.effects.form import Floats, Form, Functions
 from calibrate.model.effects.kind import Kind
 from calibrate.model.effects.ports import Place, Port
-from calibrate.model.effects.term import Shape, Term
+from calibrate.model.effects.term import Floats, Form, Functions, Shape, Term
 from calibrate.model.effects.time_laws import varies
 
 LIMIT_RAD = 5e-2

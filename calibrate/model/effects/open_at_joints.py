@@ -14,15 +14,17 @@ from calibrate.model.effects.curves import (
     splines,
 )
 from calibrate.model.effects.drivers import Drivers
-from calibrate.model.effects.form import (
+from calibrate.model.effects.gravity import loaded, stated_torque_nm
+from calibrate.model.effects.kind import Kind
+from calibrate.model.effects.term import (
     Floats,
     Form,
     Functions,
+    Inner,
+    Shape,
+    Term,
     at_joint,
 )
-from calibrate.model.effects.gravity import loaded, stated_torque_nm
-from calibrate.model.effects.kind import Kind
-from calibrate.model.effects.term import Inner, Shape, Term
 from calibrate.model.effects.time_laws import varies
 
 LIMIT_RAD = 5e-2  # nobody would call a larger error an unknown effect: a gross error

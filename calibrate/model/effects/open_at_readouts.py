@@ -5,12 +5,11 @@ import numpy as np
 from calibrate.errors import DataError
 from calibrate.model.alignment import align
 from calibrate.model.effects.drivers import Drivers
-from calibrate.model.effects.form import Floats, Form, Functions
 from calibrate.model.effects.gravity import point_of
 from calibrate.model.effects.kind import Kind
 from calibrate.model.effects.ports import Place, Port
 from calibrate.model.effects.psd_terms import half_size_m, spot
-from calibrate.model.effects.term import Inner, Shape, Term
+from calibrate.model.effects.term import Floats, Form, Functions, Inner, Shape, Term
 from calibrate.model.sensors import spots
 from calibrate.model.sensors.kind import Trait
 

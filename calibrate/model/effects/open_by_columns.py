@@ -8,15 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from calibrate.model.effects.curves import centred
-from calibrate.model.effects.drivers import Drivers
-from calibrate.model.effects.form import Floats, Form, at_joint
+from calibrate.model.effects.drivers import SHORTEST_M, Drivers, link_vectors
 from calibrate.model.effects.kind import Kind
 from calibrate.model.effects.laser_pointing import of_beam
-from calibrate.model.effects.link_span import SHORTEST_M, link_vectors
 from calibrate.model.effects.moved import motion
 from calibrate.model.effects.ports import Place, Port
 from calibrate.model.effects.psd_terms import spot
-from calibrate.model.effects.term import Shape, Term
+from calibrate.model.effects.term import Floats, Form, Shape, Term, at_joint
 from calibrate.model.effects.time_laws import Law, varies
 from calibrate.model.sensors import spots
 from calibrate.model.sensors.kind import Trait

@@ -1,10 +1,9 @@
 """What a joint yields to the payload, over and above the arm's own weight."""
 
 from calibrate.model.effects.drivers import Drivers
-from calibrate.model.effects.form import Floats, Form, at_joint
 from calibrate.model.effects.gravity import payload_levers
 from calibrate.model.effects.kind import Kind
-from calibrate.model.effects.term import Missing, Shape, Term
+from calibrate.model.effects.term import Floats, Form, Missing, Shape, Term, at_joint
 from calibrate.model.effects.time_laws import varies
 
 LIMIT = 5e-3  # rad per kg, and per kg m

@@ -3,10 +3,9 @@
 import numpy as np
 
 from calibrate.model.effects.drivers import Drivers
-from calibrate.model.effects.form import Floats
 from calibrate.model.effects.kind import Kind
 from calibrate.model.effects.psd_terms import of_both, readout
-from calibrate.model.effects.term import Missing, Shape, Term
+from calibrate.model.effects.term import Floats, Missing, Shape, Term
 from calibrate.model.effects.time_laws import varies
 
 LIMIT = 0.5  # of the light: with more, no detector would be used

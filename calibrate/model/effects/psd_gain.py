@@ -3,10 +3,9 @@
 import numpy as np
 
 from calibrate.model.effects.drivers import Drivers
-from calibrate.model.effects.form import Floats
 from calibrate.model.effects.kind import Kind
 from calibrate.model.effects.psd_terms import of_both, readout
-from calibrate.model.effects.term import Shape, Term
+from calibrate.model.effects.term import Floats, Shape, Term
 
 LIMIT = 0.1
 

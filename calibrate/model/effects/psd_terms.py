@@ -5,9 +5,8 @@ from collections.abc import Callable
 import numpy as np
 
 from calibrate.model.effects.drivers import Drivers
-from calibrate.model.effects.form import Floats, Form
 from calibrate.model.effects.ports import Place, Port
-from calibrate.model.effects.term import Shape, Term
+from calibrate.model.effects.term import Floats, Form, Shape, Term
 from calibrate.model.sensors import spots
 
 Columns = Callable[[Drivers, int, Floats], Floats]  # drivers, detector, its spot (pose, 2) -> (pose, 2, m)

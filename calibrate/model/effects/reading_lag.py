@@ -3,14 +3,16 @@
 import numpy as np
 
 from calibrate.model.effects.drivers import Drivers
-from calibrate.model.effects.form import (
+from calibrate.model.effects.kind import Kind
+from calibrate.model.effects.term import (
     Floats,
     Form,
     Functions,
+    Missing,
+    Shape,
+    Term,
     at_joint,
 )
-from calibrate.model.effects.kind import Kind
-from calibrate.model.effects.term import Missing, Shape, Term
 from calibrate.model.effects.time_laws import varies
 
 LIMIT = 1.5  # of the difference

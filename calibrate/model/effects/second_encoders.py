@@ -20,9 +20,8 @@ import numpy as np
 
 from acquisition.recording.rig.schema import EncoderSide
 from calibrate.model.effects.drivers import Drivers
-from calibrate.model.effects.form import Form
 from calibrate.model.effects.ports import Place, Port
-from calibrate.model.effects.term import Term
+from calibrate.model.effects.term import Form, Term
 from calibrate.model.sensors.encoder_difference import NAME as ENCODER_DIFFERENCE
 
 SECOND, AGAINST, PAST = "second encoder", "motor side of the second encoder", "past both encoders"

@@ -4,11 +4,11 @@ import numpy as np
 
 from calibrate.model.effects import time_laws
 from calibrate.model.effects.drivers import Drivers
-from calibrate.model.effects.form import Form
 from calibrate.model.effects.kind import Kind
 from calibrate.model.effects.moved import SIX
 from calibrate.model.effects.ports import Place, Port
 from calibrate.model.effects.term import (
+    Form,
     Holds,
     Inner,
     Shape,

@@ -4,12 +4,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from calibrate.model.effects.drivers import Drivers
-from calibrate.model.effects.form import Floats, Form
 from calibrate.model.effects.gravity import gravity_in_flange, turning_joints
 from calibrate.model.effects.kind import Kind
 from calibrate.model.effects.laser_pointing import beam_axes
 from calibrate.model.effects.ports import Place, Port
-from calibrate.model.effects.term import Shape, Term
+from calibrate.model.effects.term import Floats, Form, Shape, Term
 from calibrate.model.rigid import cross
 from calibrate.model.sensors.kind import Trait
 

@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibrate.model.effects.drivers import Drivers
-from calibrate.model.effects.form import Form
 from calibrate.model.effects.loads import (
     Load,
     carried,
@@ -22,7 +21,7 @@ from calibrate.model.effects.loads import (
     unit_loads,
 )
 from calibrate.model.effects.ports import Port
-from calibrate.model.effects.term import Shape
+from calibrate.model.effects.term import Form, Shape
 from calibrate.model.effects.time_laws import varies
 
 Floats = NDArray[np.float64]

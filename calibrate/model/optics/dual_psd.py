@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from calibrate.errors import DataError
+from calibrate.model.chain import Standing, Usage
 from calibrate.model.optics import laser
-from calibrate.model.optics import reflection as optics
-from calibrate.model.optics.laser import LaserMount
-from calibrate.model.optics.reflection import Strike
+from calibrate.model.optics import laser as optics
+from calibrate.model.optics.laser import LaserMount, Strike
 from calibrate.model.parameters import Parameter
 from calibrate.model.rigid import (
     adjoint,
@@ -25,7 +25,6 @@ from calibrate.model.rigid import (
     pose_offset,
     pose_offset_twists,
 )
-from calibrate.model.sensor_model import Standing, Usage
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -10,7 +10,7 @@ from acquisition.recording import Samples
 from acquisition.recording.rig import Rig
 from acquisition.recording.samples import BAR, BAR_END
 from calibrate.errors import DataError
-from calibrate.model.checks.least_distance import least_distance, median
+from calibrate.model.checks.rough_fit import least_distance, median
 from calibrate.model.checks.witness import (
     Otherwise,
     Strain,
@@ -19,12 +19,11 @@ from calibrate.model.checks.witness import (
     filled,
     thinned,
 )
-from calibrate.model.measured import Measured
+from calibrate.model.problem import Measured
 from calibrate.model.sample_table import SampleTable
 from calibrate.model.sensors.kind import SensorKind, Trait
-from calibrate.model.sensors.pair import PairChain
 from calibrate.model.sensors.seat import NOISE, predicted_tips, seat_sigma_m
-from calibrate.model.sensors.tip_distance import TipDistance
+from calibrate.model.sensors.tip_distance import PairChain, TipDistance
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]

@@ -27,9 +27,8 @@ from calibrate.model.checks.witness import (
     stacked,
     thinned,
 )
-from calibrate.model.measured import Measured
-from calibrate.model.placement.device import Device
-from calibrate.model.placement.target import UNKNOWN_PLAUSIBLE_M, Target
+from calibrate.model.placement import UNKNOWN_PLAUSIBLE_M, Device, Target
+from calibrate.model.problem import Measured
 from calibrate.model.sample_table import SampleTable
 from calibrate.model.sensors.full_pose import (
     FullPose,

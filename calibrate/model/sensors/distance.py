@@ -9,7 +9,7 @@ from acquisition.recording import Samples
 from acquisition.recording.samples import POSITION
 from calibrate.errors import DataError
 from calibrate.model.checks.witness import stacked
-from calibrate.model.measured import Measured
+from calibrate.model.problem import Measured
 from calibrate.model.sample_table import SampleTable
 from calibrate.model.sensors import full_pose, position
 from calibrate.model.sensors.kind import (
@@ -18,9 +18,8 @@ from calibrate.model.sensors.kind import (
     SensorKind,
     Trait,
 )
-from calibrate.model.sensors.pair import PairChain
 from calibrate.model.sensors.position import NOISE, position_sigma_m, seen_at
-from calibrate.model.sensors.tip_distance import TipDistance
+from calibrate.model.sensors.tip_distance import PairChain, TipDistance
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]

@@ -17,11 +17,10 @@ from numpy.typing import NDArray
 from acquisition.recording import Samples
 from acquisition.recording.samples import per_joint
 from calibrate.errors import DataError
-from calibrate.model.chain import Chain
-from calibrate.model.measured import Measured
+from calibrate.model.chain import Chain, Usage
 from calibrate.model.parameters import Parameter
+from calibrate.model.problem import Measured
 from calibrate.model.sample_table import SampleTable
-from calibrate.model.sensor_model import Usage
 from calibrate.model.sensors.kind import (
     NoiseSource,
     Quantity,

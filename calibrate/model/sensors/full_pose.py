@@ -17,9 +17,9 @@ from acquisition.recording import Samples
 from acquisition.recording.rig import Rig
 from acquisition.recording.samples import ORIENTATION, POSITION
 from calibrate.model.alignment import best_rotation, nearest_rotation
-from calibrate.model.chain import Chain
+from calibrate.model.chain import About, Chain, Usage
 from calibrate.model.checks.gross_error import BlunderKind
-from calibrate.model.checks.least_distance import median, weights
+from calibrate.model.checks.rough_fit import median, weights
 from calibrate.model.checks.witness import (
     Otherwise,
     Strain,
@@ -28,13 +28,11 @@ from calibrate.model.checks.witness import (
     stacked,
     thinned,
 )
-from calibrate.model.measured import Measured
 from calibrate.model.parameters import Parameter
-from calibrate.model.placement.device import Device
-from calibrate.model.placement.target import Target, point_by_twist
+from calibrate.model.placement import Device, Target, point_by_twist
+from calibrate.model.problem import Measured
 from calibrate.model.rigid import cross_matrix, left_jacobian
 from calibrate.model.sample_table import SampleTable
-from calibrate.model.sensor_model import About, Usage
 from calibrate.model.sensors.kind import (
     Columns,
     Found,

@@ -4,24 +4,25 @@ Everything that works on all sensors (fit, diagnosis, prediction, report) asks t
 spells a sensor's name or tests for its class; tests/calibrate/model/sensors/test_catalogue.py holds that.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from enum import Enum
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.recording import Samples
-from acquisition.recording.rig import Rig
-from calibrate.model.checks.gross_error import Blunder
-from calibrate.model.checks.shots import Shots
-from calibrate.model.checks.witness import Witness
-from calibrate.model.measured import Measured
-from calibrate.model.parameters import Parameter
-from calibrate.model.problem import Block
-from calibrate.model.sample_table import SampleTable
-from calibrate.model.sensor_model import Sensor
+if TYPE_CHECKING:  # an entry only names them
+    from acquisition.recording import Samples
+    from acquisition.recording.rig import Rig
+    from calibrate.model.chain import Sensor
+    from calibrate.model.checks.gross_error import Blunder, Shots
+    from calibrate.model.checks.witness import Witness
+    from calibrate.model.parameters import Parameter
+    from calibrate.model.problem import Block, Measured
+    from calibrate.model.sample_table import SampleTable
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

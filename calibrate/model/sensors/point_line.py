@@ -13,16 +13,14 @@ from numpy.typing import NDArray
 
 from acquisition.recording.samples import SPOTS
 from calibrate.errors import DataError
-from calibrate.model.chain import Chain
-from calibrate.model.measured import Measured
-from calibrate.model.optics.laser import LaserMount
-from calibrate.model.optics.lines import CENTRED_M, Lines, nearest_point
+from calibrate.model.chain import Chain, Usage
+from calibrate.model.observations import observations
+from calibrate.model.optics.laser import CENTRED_M, LaserMount, Lines, nearest_point
 from calibrate.model.parameters import Parameter
-from calibrate.model.placement.shared_points import SharedPoints
-from calibrate.model.read_samples import observations
+from calibrate.model.placement import SharedPoints
+from calibrate.model.problem import Measured
 from calibrate.model.rigid import cross
 from calibrate.model.sample_table import SampleTable
-from calibrate.model.sensor_model import Usage
 from calibrate.model.sensors import spots
 from calibrate.model.sensors.kind import NoiseSource, SensorKind
 from calibrate.model.sensors.spots import laser_of

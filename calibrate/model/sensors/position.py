@@ -11,10 +11,9 @@ from acquisition.recording import Samples
 from acquisition.recording.rig import Rig
 from acquisition.recording.samples import ORIENTATION, POSITION, TARGET
 from calibrate.errors import DataError
-from calibrate.model.chain import Chain
+from calibrate.model.chain import About, Chain, Usage
 from calibrate.model.checks.gross_error import BlunderKind
-from calibrate.model.checks.other_session import rows_of_another_session
-from calibrate.model.checks.rough_fit import rough_fit_of_targets
+from calibrate.model.checks.rough_fit import rough_fit_of_targets, rows_of_another_session
 from calibrate.model.checks.witness import (
     ENOUGH_POSES,
     Otherwise,
@@ -25,19 +24,18 @@ from calibrate.model.checks.witness import (
     stacked,
     thinned,
 )
-from calibrate.model.measured import Measured
 from calibrate.model.parameters import Parameter
-from calibrate.model.placement.device import Device
-from calibrate.model.placement.target import (
+from calibrate.model.placement import (
     TARGETS,
+    Device,
     SeveralTargets,
     Target,
     point_by_twist,
     targets_of,
 )
+from calibrate.model.problem import Measured
 from calibrate.model.rigid import transform
 from calibrate.model.sample_table import SampleTable
-from calibrate.model.sensor_model import About, Usage
 from calibrate.model.sensors.kind import (
     Columns,
     Found,

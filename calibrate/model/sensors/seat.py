@@ -16,8 +16,8 @@ from acquisition.recording.rig import Rig
 from acquisition.recording.samples import BAR, SEAT
 from calibrate.errors import DataError
 from calibrate.model.alignment import pivot
-from calibrate.model.chain import Chain
-from calibrate.model.checks.least_distance import damped, median, weights
+from calibrate.model.chain import About, Chain, Standing, Usage
+from calibrate.model.checks.rough_fit import damped, median, weights
 from calibrate.model.checks.witness import (
     Otherwise,
     Strain,
@@ -25,12 +25,10 @@ from calibrate.model.checks.witness import (
     drawn_point_m,
     filled,
 )
-from calibrate.model.measured import Measured
 from calibrate.model.parameters import Parameter
-from calibrate.model.placement.shared_points import SharedPoints
-from calibrate.model.placement.target import Target, point_by_twist
+from calibrate.model.placement import SharedPoints, Target, point_by_twist
+from calibrate.model.problem import Measured
 from calibrate.model.sample_table import SampleTable
-from calibrate.model.sensor_model import About, Standing, Usage
 from calibrate.model.sensors.kind import (
     Columns,
     Found,

@@ -20,7 +20,7 @@ from calibrate.errors import DataError
 from calibrate.model.alignment import best_rotation
 from calibrate.model.chain import Chain
 from calibrate.model.checks.gross_error import BlunderKind
-from calibrate.model.checks.least_distance import median, weights
+from calibrate.model.checks.rough_fit import median, weights
 from calibrate.model.checks.witness import (
     Otherwise,
     Strain,
@@ -30,11 +30,10 @@ from calibrate.model.checks.witness import (
     thinned,
 )
 from calibrate.model.default_tolerance import pair_of
-from calibrate.model.measured import Measured
+from calibrate.model.observations import observations
 from calibrate.model.optics.dual_psd import DualPsd, Fixture
 from calibrate.model.optics.laser import LaserMount
-from calibrate.model.problem import Block
-from calibrate.model.read_samples import observations
+from calibrate.model.problem import Block, Measured
 from calibrate.model.rigid import transform
 from calibrate.model.sample_table import SampleTable
 from calibrate.model.sensors.kind import (

@@ -1,19 +1,53 @@
-"""Instrument: the distance between the target at two poses, needing no frame: ball bars and relative distances.
+"""Instruments that compare two poses: the distance between the target at both, which needs no frame (bar, distance).
 
 Source of the relative distance |P_n - P_(n-1)| as an observation: patent CN114523474B, step 4.
 """
 
 from dataclasses import dataclass, replace
-from typing import Self
+from typing import Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
+from calibrate.model.chain import About, ObservationModel, Usage, Used
 from calibrate.model.parameters import Parameter
-from calibrate.model.placement.target import Target, point_by_twist
-from calibrate.model.sensor_model import About, Usage
+from calibrate.model.placement import Target, point_by_twist
 
 Floats = NDArray[np.float64]
+
+
+class PairSensor(Used, Protocol):
+    """As sensors.model.Sensor, but of two flange poses a row."""
+
+    def expect(self, phi: Floats, T_base_a: Floats, T_base_b: Floats) -> Floats:
+        """(pair, k) readings for flange poses (pair, 4, 4) each and parameter values phi (param,)."""
+        ...
+
+    def by_twists(self, phi: Floats, T_base_a: Floats, T_base_b: Floats) -> tuple[Floats, Floats]:
+        """(pair, k, 6) derivative by a base-frame twist [v; w] of flange a, and of flange b."""
+        ...
+
+    def by_parameter(self, phi: Floats, T_base_a: Floats, T_base_b: Floats) -> Floats:
+        """(pair, k, param) derivative by the sensor's own parameters."""
+        ...
+
+
+@dataclass(frozen=True)
+class PairChain(ObservationModel):
+    """ObservationModel of pairs of poses."""
+
+    sensor: PairSensor
+
+    poses = 2
+
+    def at_flanges(self, own: Floats, flanges: tuple[Floats, ...]) -> Floats:
+        return self.sensor.expect(own, *flanges)
+
+    def by_flanges(self, own: Floats, flanges: tuple[Floats, ...]) -> tuple[Floats, ...]:
+        return self.sensor.by_twists(own, *flanges)
+
+    def by_own(self, own: Floats, flanges: tuple[Floats, ...]) -> Floats:
+        return self.sensor.by_parameter(own, *flanges)
 
 
 @dataclass(frozen=True)

@@ -12,9 +12,9 @@ from acquisition.recording.rig import Rig
 from acquisition.recording.samples import WIRE as COLUMN
 from calibrate.errors import DataError
 from calibrate.model.alignment import trilaterate
-from calibrate.model.chain import Chain
+from calibrate.model.chain import About, Chain, Usage
 from calibrate.model.checks.gross_error import BlunderKind
-from calibrate.model.checks.least_distance import least_distance, median
+from calibrate.model.checks.rough_fit import least_distance, median
 from calibrate.model.checks.witness import (
     Otherwise,
     Strain,
@@ -23,12 +23,10 @@ from calibrate.model.checks.witness import (
     filled,
     thinned,
 )
-from calibrate.model.measured import Measured
 from calibrate.model.parameters import Parameter
-from calibrate.model.placement.device import Device
-from calibrate.model.placement.target import Target, point_by_twist
+from calibrate.model.placement import Device, Target, point_by_twist
+from calibrate.model.problem import Measured
 from calibrate.model.sample_table import SampleTable
-from calibrate.model.sensor_model import About, Usage
 from calibrate.model.sensors.kind import (
     Columns,
     Found,

@@ -17,14 +17,13 @@ from calibrate.model.arms.catalogue import arm_of
 from calibrate.model.arms.serial import SerialArm
 from calibrate.model.effect_records import Effect
 from calibrate.model.effects.catalogue import EFFECTS
-from calibrate.model.effects.causes import cause
-from calibrate.model.effects.curve import curve
-from calibrate.model.effects.drivers import Drivers, Readout, temperatures_of
-from calibrate.model.effects.form import Form
+from calibrate.model.effects.conditions import temperatures_of
+from calibrate.model.effects.curve import cause, curve
+from calibrate.model.effects.drivers import Drivers, Readout
 from calibrate.model.effects.gravity import likely_torque_nm
 from calibrate.model.effects.ports import Perturbation, Place, Port
 from calibrate.model.effects.second_encoders import SECOND, at_second_encoders
-from calibrate.model.effects.term import Accepted, Shape, Term
+from calibrate.model.effects.term import Accepted, Form, Shape, Term
 from calibrate.model.predict import Predictor, readings
 from calibrate.model.sensors.catalogue import kind_of
 from calibrate.model.sensors.encoder_difference import NAME as ENCODER_DIFFERENCE
@@ -299,7 +298,7 @@ def _readouts(predictor: Predictor, samples: Samples, frames: Floats, by: Pertur
     if joints := tuple(i for i in range(1, samples.n_joints + 1) if f"encoder{i}.zero" in predictor.values):
         n = len(frames)  # of use to find where an effect sits; nothing else depends on these readings
         nothing = np.full((n, len(joints)), np.nan)
-        out[ENCODER_DIFFERENCE] = Readout(ENCODER_DIFFERENCE, nothing, np.zeros(n, dtype=bool), joints=joints)
+        out[ENCODER_DIFFERENCE] = Readout(kind_of(ENCODER_DIFFERENCE), nothing, np.zeros(n, dtype=bool), joints=joints)
     return out
 
 

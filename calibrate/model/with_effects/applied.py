@@ -16,7 +16,8 @@ from acquisition.recording import Samples
 from acquisition.recording.samples import SEAT, required
 from calibrate.errors import DataError
 from calibrate.model.effect_records import Effect
-from calibrate.model.effects.drivers import MOVED_RAD, Drivers, moves_of
+from calibrate.model.effects.conditions import MOVED_RAD, moves_of
+from calibrate.model.effects.drivers import Drivers
 from calibrate.model.effects.loads import UNSTATED_CENTRE_M
 from calibrate.model.effects.payload_compliance import UNKNOWN_CENTRE
 from calibrate.model.effects.ports import Perturbation, Port

@@ -16,7 +16,7 @@ from calibrate.model.arms.serial import SerialArm
 from calibrate.model.effects.drivers import Drivers
 from calibrate.model.effects.ports import Perturbation, Place, Port
 from calibrate.model.effects.term import Accepted
-from calibrate.model.measured import Measured
+from calibrate.model.problem import Measured
 from calibrate.model.rigid import inverse
 from calibrate.model.unknowns import Unknowns
 from calibrate.model.with_effects.ported_chain import (

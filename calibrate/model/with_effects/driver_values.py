@@ -7,13 +7,10 @@ from numpy.typing import NDArray
 
 from acquisition.recording import Samples
 from acquisition.recording.rig import Rig
-from calibrate.model.effects.drivers import (
-    Drivers,
-    Readout,
-    conditions_of,
-    uncoupled_samples,
-)
-from calibrate.model.sensor_model import Standing, Used
+from calibrate.model.chain import Standing, Used
+from calibrate.model.effects.conditions import conditions_of, uncoupled_samples
+from calibrate.model.effects.drivers import Drivers, Readout
+from calibrate.model.sensors.catalogue import kind_of
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -60,7 +57,7 @@ def readout_at(
     predicted[rows], seen[rows] = expected, True
     stood = Standing() if sensor is None else sensor.standing(phi, frames[rows, -1])
     return Readout(
-        name,
+        kind_of(name),
         predicted,
         seen,
         None if stood.incidence_rad is None else _among(n, rows, stood.incidence_rad, np.nan),

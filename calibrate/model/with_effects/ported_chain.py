@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from calibrate.model.arms.serial import SerialArm, chain_frames
+from calibrate.model.chain import ObservationModel
 from calibrate.model.effects.ports import Perturbation, Place, Port
-from calibrate.model.measured import Measured
-from calibrate.model.observation_model import ObservationModel
+from calibrate.model.problem import Measured
 from calibrate.model.rigid import cross_matrix, inverse, turn_twist
 
 Floats = NDArray[np.float64]

@@ -22,9 +22,9 @@ from acquisition.recording.rig import ArmModel, Joint, Rig, parse_rig
 from calibrate.diagnose.record.schema import DiagnosisFile
 from calibrate.errors import DataError
 from calibrate.fit.accuracy import Alarm, target_by_parameter
-from calibrate.model.converted_rig import rig_in_model
 from calibrate.model.model_file import Covariance, ModelFile, ModelParameter
 from calibrate.model.parameters import index_of
+from calibrate.model.predict import rig_in_model
 from calibrate.report.elements.verdict import UNLIKELY
 from calibrate.report.evidence.model_tests import repeated, scatter
 from calibrate.report.workspace.workspace_errors import (

@@ -18,28 +18,25 @@ from calibrate.apply.export import IdentifiedArm, dh_arm, dh_table_of, identifie
 from calibrate.errors import DataError
 from calibrate.fit.accuracy import spare_readings
 from calibrate.fit.fit_plan import DEFAULT, parse_plan
-from calibrate.fit.identify.planned import rig_as_planned, samples_as_planned
-from calibrate.fit.identify.session import instruments_for_fit, standing_at
+from calibrate.fit.identify.session import instruments_for_fit, rig_as_planned, samples_as_planned, standing_at
 from calibrate.fit.joint_problem import JointProblem
 from calibrate.fit.noise import VarianceFactors, as_believed
 from calibrate.fit.rank import analyse
 from calibrate.fit.solvers import solve
 from calibrate.fit.weighting import Weighting
 from calibrate.model.arms.catalogue import arm_of
-from calibrate.model.converted_rig import rig_in_model
+from calibrate.model.chain import KinematicModel
 from calibrate.model.dual_psd_rig import dual_psd_chain
-from calibrate.model.kinematic_model import KinematicModel
-from calibrate.model.measured import Measured
 from calibrate.model.model_file import ModelFile
-from calibrate.model.observations import Observations
+from calibrate.model.observations import Observations, observations
 from calibrate.model.parameters import (
     Parameter,
     index_of,
     start_values,
     without_assumed,
 )
-from calibrate.model.problem import Problem
-from calibrate.model.read_samples import observations
+from calibrate.model.predict import rig_in_model
+from calibrate.model.problem import Measured, Problem
 from calibrate.model.sensors import spots
 from calibrate.model.sensors.catalogue import kind_of
 from calibrate.quantities import angle, length

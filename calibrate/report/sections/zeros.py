@@ -7,8 +7,8 @@ from matplotlib.figure import Figure
 
 from calibrate.fit.fit_plan import BesideName, parse_plan
 from calibrate.fit.identify.estimates import Estimate, JointZero, joint_zeros
-from calibrate.fit.identify.planned import rig_as_planned
 from calibrate.fit.identify.point_constraint import PointConstraintResult, point_constraints
+from calibrate.fit.identify.session import rig_as_planned
 from calibrate.fit.rank import in_plain_words, plain_reason, reason_among
 from calibrate.model.default_tolerance import links_of
 from calibrate.model.sensors import spots

@@ -27,7 +27,7 @@ from calibrate.fit.accuracy import (
 from calibrate.fit.rank import Identifiability, analyse_along, in_plain_words
 from calibrate.model.alignment import aligned_difference
 from calibrate.model.arms.rig_arm import limits_of
-from calibrate.model.kinematic_model import KinematicModel
+from calibrate.model.chain import KinematicModel
 from calibrate.model.model_file import Covariance, Fields, FreeSpaceRecord
 from calibrate.model.parameters import Parameter, index_of, without_assumed
 from calibrate.model.rigid import cross_matrix

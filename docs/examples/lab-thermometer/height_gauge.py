@@ -6,14 +6,12 @@ from typing import Self
 import numpy as np
 
 from acquisition.recording import Samples
-from calibrate.model.chain import Chain
-from calibrate.model.measured import Measured
+from calibrate.model.chain import About, Chain, Usage
 from calibrate.model.parameters import Parameter
-from calibrate.model.placement.device import Device
-from calibrate.model.placement.target import Target, point_by_twist
+from calibrate.model.placement import Device, Target, point_by_twist
+from calibrate.model.problem import Measured
 from calibrate.model.rigid import transform
 from calibrate.model.sample_table import SampleTable
-from calibrate.model.sensor_model import About, Usage
 from calibrate.model.sensors.kind import (
     Columns,
     Floats,

@@ -11,7 +11,7 @@ from acquisition.recording.rig import Placement, Pose, load_rig
 from calibeam.live.composer import Composer
 from calibeam.live.feed import Progress
 from calibeam.live.health import Latest
-from calibrate.model.assumed_rig.assumed_rig import BelievedRig
+from calibrate.model.assumed_rig import BelievedRig
 from drivers.device import Block
 
 RIGS = Path(__file__).parents[3] / "rigs"

@@ -10,7 +10,7 @@ from acquisition.recording.rig import Rig, load_rig
 from acquisition.session.plan import PlanOptions, blocks
 from acquisition.session.records import Sample
 from calibeam.sessions.forecast import Ahead, ahead_of_blocks
-from calibrate.model.assumed_rig.assumed_rig import BelievedRig
+from calibrate.model.assumed_rig import BelievedRig
 
 RIG_FILE = Path(__file__).parents[3] / "rigs" / "ur5e-dual-psd.toml"
 MEAN_OF = 200  # readings in a dwell: sigma of their mean

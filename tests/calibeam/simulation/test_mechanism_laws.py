@@ -24,6 +24,7 @@ from calibrate.model.effects.second_encoders import PLACES
 from calibrate.model.effects.term import Shape, Term
 from calibrate.model.predict import Predictor, readings
 from calibrate.model.sensors.camera import PLACE, TURN
+from calibrate.model.sensors.catalogue import kind_of
 from calibrate.model.sensors.encoder_difference import NAME as ENCODER_DIFFERENCE
 from calibrate.model.with_effects.acting import arm_in, moved_columns
 from calibrate.model.with_effects.ported_chain import perturbed_frames
@@ -209,7 +210,7 @@ def test_two_encoders_see_the_drive_from_where_they_sit() -> None:
     """In the difference of both encoders, what the effect adds there; at the flange, what it adds to the chain."""
     place = bench("tracker")
     rows, joints = len(place.samples), (1, 2, 3, 4, 5, 6)
-    readout = Readout(ENCODER_DIFFERENCE, np.zeros((rows, 6)), np.ones(rows, dtype=bool), joints=joints)
+    readout = Readout(kind_of(ENCODER_DIFFERENCE), np.zeros((rows, 6)), np.ones(rows, dtype=bool), joints=joints)
     drivers = replace(place.drivers, readouts={**place.drivers.readouts, ENCODER_DIFFERENCE: readout})
     session = FoundIn.of(place.predictor, drivers)
     sites = [t for t in terms_of(drivers) if t.port.where == "joint2.angle" and (not t.open or t.shape is Shape.SMOOTH)]

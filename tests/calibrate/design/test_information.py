@@ -8,7 +8,7 @@ import pytest
 from calibrate.design.information import ALONG_M, POSES, target_of
 from calibrate.fit.identify.session import instruments_for_fit
 from calibrate.model.arms.catalogue import arm_of
-from calibrate.model.assumed_rig.assumed_arm import believed_arm
+from calibrate.model.assumed_rig import believed_arm
 
 LENGTH = ("link2.length", "link3.twist", "joint4.zero", "laser.tilt_u", "laser.shift_v")
 

@@ -63,7 +63,7 @@ def test_the_plan_promises_less_error_than_random_poses(made):
 
 
 def test_expected_spots_are_those_of_the_rig_as_drawn(rig, candidates, made):
-    from calibrate.model.assumed_rig.assumed_rig import BelievedRig
+    from calibrate.model.assumed_rig import BelievedRig
 
     believed = BelievedRig(rig)
     for block in made.plan.block:
@@ -74,8 +74,7 @@ def test_expected_spots_are_those_of_the_rig_as_drawn(rig, candidates, made):
 
 def test_candidates_are_within_limits_above_the_table_and_lit(rig, candidates):
     from acquisition.centring.aim import clear_of_table
-    from calibrate.model.assumed_rig.assumed_fixture import Light
-    from calibrate.model.assumed_rig.assumed_rig import BelievedRig
+    from calibrate.model.assumed_rig import BelievedRig, Light
 
     believed = BelievedRig(rig)
     for q, place, first in zip(candidates.q_rad, candidates.placement, candidates.first_psd, strict=True):

@@ -8,12 +8,11 @@ import pytest
 from acquisition.recording.rig import load_rig
 from benchmarks.drawn_sessions import POSITION_SIGMA_M, T_BASE_DEVICE, TARGET_M, Bench
 from calibrate.fit.rank.identifiability import Identifiability, analyse
-from calibrate.fit.rank.redundant import reduced
+from calibrate.fit.rank.observability import reduced
 from calibrate.fit.solvers import Fit, solve
 from calibrate.model.arms.catalogue import arm_of
 from calibrate.model.chain import Chain
-from calibrate.model.placement.device import Device
-from calibrate.model.placement.target import Target
+from calibrate.model.placement import Device, Target
 from calibrate.model.problem import Problem
 from calibrate.model.rigid import transform
 from calibrate.model.sensors.position import Position

@@ -13,7 +13,7 @@ from calibrate.fit.fit_plan import (
     read_plan,
 )
 from calibrate.fit.held_out.splits import SplitKind
-from calibrate.fit.rank.redundant import Redundant
+from calibrate.fit.rank.observability import Redundant
 from calibrate.fit.solvers import DogLegRules, Loss, Method
 
 

@@ -10,13 +10,11 @@ from calibrate.fit import weighting as weighting_module
 from calibrate.fit.rank.identifiability import analyse
 from calibrate.fit.weighting import Weighting
 from calibrate.model.arms.catalogue import arm_of
-from calibrate.model.measured import Measured
 from calibrate.model.parameters import hold
-from calibrate.model.placement.target import Target
-from calibrate.model.problem import Problem, decorrelated
+from calibrate.model.placement import Target
+from calibrate.model.problem import Measured, Problem, decorrelated
 from calibrate.model.sensors.distance import consecutive_pairs, shared_correlation
-from calibrate.model.sensors.pair import PairChain
-from calibrate.model.sensors.tip_distance import TipDistance
+from calibrate.model.sensors.tip_distance import PairChain, TipDistance
 
 SIGMA_M, JOINT_RAD = 50e-6, 4e-5
 

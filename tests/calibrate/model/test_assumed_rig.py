@@ -7,8 +7,7 @@ import pytest
 from acquisition.recording.rig import ArmModel, load_rig
 from calibrate.errors import DataError
 from calibrate.model.arms.convert import convert
-from calibrate.model.assumed_rig.assumed_fixture import Light
-from calibrate.model.assumed_rig.assumed_rig import BelievedRig
+from calibrate.model.assumed_rig import BelievedRig, Light
 from calibrate.model.dual_psd_rig import dual_psd_chain
 from calibrate.model.parameters import start_values
 

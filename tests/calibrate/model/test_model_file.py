@@ -9,7 +9,7 @@ from acquisition.recording.rig import load_rig, rig_sha256, rig_text
 from calibrate.errors import DataError
 from calibrate.fit.identify.identify import identify
 from calibrate.fit.identify.record import record_of
-from calibrate.model.assumed_rig.assumed_rig import BelievedRig
+from calibrate.model.assumed_rig import BelievedRig
 from calibrate.model.model_file import (
     RigIdentity,
     corrections,

@@ -5,7 +5,7 @@ import pytest
 
 from acquisition.recording import Samples
 from calibrate.errors import DataError
-from calibrate.model.read_samples import SIGMA_COLUMNS, observations
+from calibrate.model.observations import SIGMA_COLUMNS, observations
 
 NAN = float("nan")
 SPOTS = ("psd1_x_m", "psd1_y_m", "psd2_x_m", "psd2_y_m")

@@ -2,7 +2,7 @@
 
 import pytest
 
-from calibrate.fit.rank.not_determined import in_plain_words
+from calibrate.fit.rank.observability import in_plain_words
 
 
 @pytest.mark.parametrize(

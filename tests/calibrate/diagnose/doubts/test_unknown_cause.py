@@ -15,9 +15,8 @@ from calibrate.diagnose.search.score import removed
 from calibrate.diagnose.search.search import search
 from calibrate.diagnose.search.searching import holds
 from calibrate.model.effects.curve import curve
-from calibrate.model.effects.form import Form
 from calibrate.model.effects.ports import Place, Port
-from calibrate.model.effects.term import Accepted, Missing, Shape
+from calibrate.model.effects.term import Accepted, Form, Missing, Shape
 from tests.calibrate.diagnose.conftest import Plain
 
 SIZE_RAD = 1.5

@@ -10,7 +10,7 @@ from calibrate.diagnose.doubts.pulled_back import picture_driver
 from calibrate.diagnose.streams.continuity import Fault
 from calibrate.diagnose.streams.to_file import EXPLAINS, USUAL
 from calibrate.model.effects.catalogue import EFFECTS, missing_of, terms_of
-from calibrate.model.effects.causes import causes_of
+from calibrate.model.effects.curve import causes_of
 from calibrate.model.effects.term import Shape
 from simulators.conceal.wanted import FAMILIES
 from tests.calibrate.model.effects.conftest import full_session

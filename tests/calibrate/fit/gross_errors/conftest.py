@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from calibrate.model.checks.shots import Shots
+from calibrate.model.checks.gross_error import Shots
 
 # d, a, alpha of a UR5 (Universal Robots, "DH Parameters for calculations of kinematics and dynamics")
 UR5 = np.array(

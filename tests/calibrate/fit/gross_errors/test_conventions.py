@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from calibrate.fit.gross_errors.conventions import wrong_convention
-from calibrate.fit.gross_errors.degrees import beyond_limits
+from calibrate.fit.gross_errors.joint_hypotheses import beyond_limits
 from calibrate.model.checks.gross_error import BlunderKind
 from calibrate.model.checks.rough_fit import rough_fit
 from calibrate.model.sensors.position import PositionWitness

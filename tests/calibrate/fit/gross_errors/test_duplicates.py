@@ -5,7 +5,7 @@ import pytest
 
 from acquisition.recording.rig import parse_rig
 from acquisition.recording.session_folder.tables import parse_csv
-from calibrate.fit.gross_errors.of_the_table import duplicated_rows
+from calibrate.fit.gross_errors.bad_rows import duplicated_rows
 
 RIG = """schema = 1
 name = "one-joint"

@@ -3,7 +3,7 @@
 import numpy as np
 
 from acquisition.recording import Samples
-from calibrate.fit.gross_errors.of_the_table import left_alone
+from calibrate.fit.gross_errors.bad_rows import left_alone
 from calibrate.model.checks.gross_error import Blunder, BlunderKind
 
 

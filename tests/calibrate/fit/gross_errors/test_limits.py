@@ -3,7 +3,7 @@
 import numpy as np
 
 from acquisition.recording import Samples
-from calibrate.fit.gross_errors.of_the_table import rows_beyond_limits
+from calibrate.fit.gross_errors.bad_rows import rows_beyond_limits
 from calibrate.model.checks.gross_error import BlunderKind
 
 LIMITS = np.array([[-2.0, 2.0], [-1.0, 3.0]])

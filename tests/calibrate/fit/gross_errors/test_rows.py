@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from calibrate.fit.gross_errors.bad_rows import bad_rows
 from calibrate.model.checks.gross_error import BlunderKind
-from calibrate.model.checks.other_session import rows_of_another_session, sessions_apart
+from calibrate.model.checks.rough_fit import rows_of_another_session, sessions_apart
 from tests.calibrate.fit.gross_errors.conftest import NOISE, POINT, flange
 
 

@@ -11,7 +11,7 @@ from calibrate.fit.held_out.held_out import Proof, beyond_sigma, held_out
 from calibrate.fit.held_out.splits import at_random, by_place, last_block
 from calibrate.fit.joint_problem import JointProblem
 from calibrate.fit.rank.identifiability import analyse
-from calibrate.fit.rank.redundant import reduced
+from calibrate.fit.rank.observability import reduced
 from calibrate.fit.solvers import solve
 from calibrate.model.dual_psd_rig import dual_psd_chain
 from calibrate.model.problem import Problem

@@ -9,7 +9,7 @@ from acquisition.recording.rig import load_rig
 from benchmarks.intervals import intervals
 from calibrate.fit.identify.point_constraint import BOUND_RAD, Form, PointConstraint
 from calibrate.fit.rank.identifiability import analyse
-from calibrate.fit.rank.redundant import Redundant, reduced
+from calibrate.fit.rank.observability import Redundant, reduced
 from calibrate.fit.solvers import Status, solve
 from calibrate.model.arms.catalogue import arm_of
 from calibrate.model.dual_psd_rig import laser_of

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from calibrate.fit.accuracy.fit_statistics import checks_nothing, spare_readings
+from calibrate.fit.accuracy import checks_nothing, spare_readings
 from calibrate.fit.solvers import solve
 from calibrate.model.parameters import Parameter
 

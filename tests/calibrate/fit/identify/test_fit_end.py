@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
-from calibrate.fit.accuracy.fit_statistics import minus_2_log_likelihood
+from calibrate.fit.accuracy import minus_2_log_likelihood
 from calibrate.fit.fit_plan import parse_plan
 from calibrate.fit.identify.identify import identify, without_blunders
 from calibrate.fit.identify.record import record_of

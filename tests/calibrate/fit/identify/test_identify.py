@@ -6,7 +6,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from calibrate.errors import DataError
-from calibrate.fit.accuracy.fit_statistics import Alarm
+from calibrate.fit.accuracy import Alarm
 from calibrate.fit.identify.identify import identify
 from calibrate.fit.solvers import Status
 from calibrate.model.checks.gross_error import BlunderKind

@@ -6,7 +6,7 @@ import pytest
 
 from acquisition.recording.rig import load_rig
 from calibrate.errors import DataError
-from calibrate.fit.accuracy.fit_statistics import Alarm
+from calibrate.fit.accuracy import Alarm
 from calibrate.fit.identify.estimates import conditional_sigma
 from calibrate.fit.identify.identify import identify
 from calibrate.fit.identify.rounds import coarse_start, settled_fit

@@ -9,7 +9,7 @@ import pytest
 from acquisition.recording import Samples
 from acquisition.recording.rig import Pose
 from acquisition.recording.rig.schema import KnownDistance
-from calibrate.fit.accuracy.fit_statistics import Alarm
+from calibrate.fit.accuracy import Alarm
 from calibrate.fit.fit_plan import FitPlan
 from calibrate.fit.identify.identify import identify
 from calibrate.fit.solvers import Status

@@ -15,7 +15,7 @@ from calibrate.fit.fit_plan import (
     parse_plan,
 )
 from calibrate.fit.identify.identify import identify
-from calibrate.fit.identify.planned import rig_as_planned
+from calibrate.fit.identify.session import rig_as_planned
 from calibrate.model.predict import Predictor, predict
 from tests.calibrate.fit.identify.conftest import Session, table
 

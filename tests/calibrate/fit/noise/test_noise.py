@@ -5,7 +5,7 @@ import pytest
 
 from calibrate.fit.noise import variance
 from calibrate.fit.noise.variance import NoisyRows
-from calibrate.model.measured import parts_of
+from calibrate.model.problem import parts_of
 
 
 def draw(rng, n, joint_rad, psd_m, columns=10):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from calibrate.errors import DataError
-from calibrate.fit.noise.noisy_rows import common_axes
+from calibrate.fit.noise.restricted_likelihood import common_axes
 
 
 @pytest.mark.parametrize("singular", [np.zeros((2, 2)), np.ones((2, 2))])

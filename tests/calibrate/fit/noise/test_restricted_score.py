@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from calibrate.errors import DataError, naming_undetermined
-from calibrate.fit.noise.noisy_rows import (
+from calibrate.fit.noise.restricted_likelihood import (
     FIXED,
     NoisyRows,
     covariance_of,
     independent,
+    score_at,
 )
-from calibrate.fit.noise.restricted_score import score_at
 
 ROWS, PARAMS = 14, 9
 

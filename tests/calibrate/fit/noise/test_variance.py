@@ -5,10 +5,9 @@ import pytest
 from scipy.optimize import minimize
 
 from calibrate.fit.noise import variance
-from calibrate.fit.noise.noisy_rows import NoisyRows, independent
-from calibrate.fit.noise.restricted_score import score_at
+from calibrate.fit.noise.restricted_likelihood import NoisyRows, independent, score_at
 from calibrate.fit.noise.variance import LOG_VARIANCE_PRIOR, MAX_STEPS
-from calibrate.model.measured import parts_of
+from calibrate.model.problem import parts_of
 
 
 def drawn(joint_rad, psd_m, believed=(3e-6, 2e-6), n=200, columns=12, seed=1):

@@ -8,9 +8,7 @@ import pytest
 from acquisition.recording.rig import load_rig
 from calibrate.fit.identify.point_constraint import BOUND_RAD, Form, PointConstraint
 from calibrate.fit.rank.identifiability import analyse, in_words, plainly
-from calibrate.fit.rank.observability import observability
-from calibrate.fit.rank.redundant import Redundant, reduced
-from calibrate.fit.rank.unseen_along import analyse_along
+from calibrate.fit.rank.observability import Redundant, analyse_along, observability, reduced
 from calibrate.fit.solvers import Status, solve
 from calibrate.model.arms.catalogue import arm_of
 from calibrate.model.dual_psd_rig import laser_of

@@ -12,8 +12,8 @@ from calibrate.fit.solvers import (
     Stop,
     solve,
 )
-from calibrate.fit.solvers.dogleg import dogleg_step, next_radius, second_leg
-from calibrate.fit.solvers.linear import gauss_newton_step
+from calibrate.fit.solvers.least_squares import gauss_newton_step
+from calibrate.fit.solvers.trust_region import dogleg_step, next_radius, second_leg
 from calibrate.model.parameters import Parameter
 
 

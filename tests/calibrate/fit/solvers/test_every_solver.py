@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from acquisition.recording.rig import load_rig
 from calibrate.fit.rank.identifiability import analyse
-from calibrate.fit.rank.redundant import reduced
+from calibrate.fit.rank.observability import reduced
 from calibrate.fit.solvers import (
     DogLegRules,
     Method,
@@ -20,8 +20,7 @@ from calibrate.fit.solvers import (
 from calibrate.model.chain import Chain
 from calibrate.model.dual_psd_rig import dual_psd_chain
 from calibrate.model.parameters import plausible_sizes, start_values
-from calibrate.model.placement.device import Device
-from calibrate.model.placement.target import Target
+from calibrate.model.placement import Device, Target
 from calibrate.model.problem import Problem
 from calibrate.model.rigid import transform
 from calibrate.model.sensors.position import Position

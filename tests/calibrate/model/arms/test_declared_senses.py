@@ -11,7 +11,7 @@ from calibrate.model.arms.catalogue import arm_of
 from calibrate.model.arms.convert import convert, corrected_parts, flange_of_parts
 from calibrate.model.arms.link_tolerance import FREE
 from calibrate.model.arms.rig_arm import RigArm
-from calibrate.model.effects.drivers import conditions_of, uncoupled_samples
+from calibrate.model.effects.conditions import conditions_of, uncoupled_samples
 from calibrate.model.effects.loads import stated_masses
 
 RNG = np.random.default_rng(8)

@@ -11,9 +11,8 @@ import pytest
 from calibrate.diagnose.state.visible import grid_of, sight_of
 from calibrate.model.effects import catalogue
 from calibrate.model.effects.catalogue import EFFECTS, missing_of
-from calibrate.model.effects.form import Form
 from calibrate.model.effects.ports import Place
-from calibrate.model.effects.term import UNITS, Shape
+from calibrate.model.effects.term import UNITS, Form, Shape
 from simulators.conceal.wanted import FAMILIES
 from tests.calibrate.model.effects.conftest import full_session
 

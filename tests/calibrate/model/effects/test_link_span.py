@@ -10,7 +10,7 @@ from acquisition.recording.rig import ArmModel
 from calibrate.model.arms.catalogue import arm_of
 from calibrate.model.arms.convert import convert
 from calibrate.model.effects.axis_wobble import EFFECT as WOBBLE
-from calibrate.model.effects.link_span import link_vectors
+from calibrate.model.effects.drivers import link_vectors
 from calibrate.model.effects.link_thermal_growth import EFFECT as GROWTH
 from calibrate.model.effects.ports import Perturbation
 from calibrate.model.with_effects.ported_chain import flange_twists, perturbed_frames

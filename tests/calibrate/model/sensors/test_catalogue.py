@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from calibrate.model import sensors
-from calibrate.model.sensor_model import Usage
+from calibrate.model.chain import Usage
 from calibrate.model.sensors.catalogue import (
     BY_NAME,
     SENSORS,
@@ -21,7 +21,7 @@ from tests.support.trees import tree_of
 
 ROOT = Path(sensors.__file__).parents[3]
 MODEL = ROOT / "calibrate" / "model"
-OWN = ("sensors", "optics", "placement")  # folders of sensors and of what they are made of
+OWN = ("sensors", "optics")  # folders of sensors and of what they are made of
 # Why a file may spell a sensor's name.
 SPELLED = {
     "calibeam/prove": "families of the simulator's scenarios, which have the proof's own names",

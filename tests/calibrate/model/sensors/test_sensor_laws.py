@@ -9,8 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from calibrate.model.optics.dual_psd import DualPsd, Fixture, PairBelief
 from calibrate.model.optics.laser import LaserMount
-from calibrate.model.placement.device import Device
-from calibrate.model.placement.target import Target
+from calibrate.model.placement import Device, Target
 from calibrate.model.rigid import transform
 from calibrate.model.sensors.catalogue import BY_NAME
 from calibrate.model.sensors.encoder_difference import EncoderDifference

@@ -5,7 +5,7 @@ import pytest
 
 from calibrate.diagnose.state.fitted import fit_geometry
 from calibrate.diagnose.state.session import session_of
-from calibrate.model.effects.causes import cause
+from calibrate.model.effects.curve import cause
 from tests.calibrate.diagnose.concealed import changed, recording_of
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from calibrate.model.assumed_rig.assumed_rig import BelievedRig
+from calibrate.model.assumed_rig import BelievedRig
 from calibrate.report.evidence.session_evidence import SessionEvidence, SpotSession, spot_session
 from calibrate.report.figures.rig_scene import (
     FittedRig,

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from calibrate.errors import DataError
-from calibrate.model.placement.shared_points import SharedPoints
+from calibrate.model.placement import SharedPoints
 
 START_M = {2: np.array([1.0, 2.0, 3.0]), 7: np.array([4.0, 5.0, 6.0])}
 SHIFTS_M = np.array([0.1, 0.2, 0.3, -0.1, -0.2, -0.3])

@@ -1,15 +1,28 @@
-"""Free-space error: what is predicted is what is found against the truth, frames aside."""
+"""How good a fit is: chi-square and the error over the workspace.
+
+Chi-square: silent where noise is as stated, an alarm with its name where it is not.
+
+Free-space error: what is predicted is what is found against the truth, frames aside.
+
+Twenty sessions, and sixty: as many 95 % intervals hold the truth as chance allows.
+"""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.stats import binom
 
+from benchmarks import coverage
 from benchmarks.drawn_sessions import TARGET_M
-from calibrate.fit.accuracy.free_space import (
+from calibrate.fit.accuracy import (
+    ALARM_P,
+    Alarm,
     FreeSpaceStatus,
     Scatter,
     Workspace,
+    against_repeats,
+    against_stated,
     free_space_error,
     without_rigid_motion,
 )
@@ -18,6 +31,66 @@ from calibrate.fit.solvers import solve
 from calibrate.model.alignment import aligned_difference
 
 ROOM = Workspace(np.full(6, -2.5), np.full(6, 2.5), TARGET_M, 400)
+
+
+def test_noise_as_stated_is_no_alarm(fitted):
+    fit = fitted(1).fit
+    found = against_stated(fit.chi2, fit.dof)
+    assert found.alarm is Alarm.NONE
+    assert ALARM_P < found.p_above < 1.0 - ALARM_P
+    assert found.noise_factor == pytest.approx(1.0, abs=0.25)
+
+
+def test_noise_twice_the_stated_is_an_alarm_and_its_size_is_said(fitted):
+    fit = fitted(1, noise=2.0).fit
+    found = against_stated(fit.chi2, fit.dof)
+    assert found.alarm is Alarm.ABOVE_STATED
+    assert found.p_above < 1e-6
+    assert 1.5 < found.noise_factor < 2.2  # drawn links and frames take up a little
+
+
+def test_overstated_noise_is_an_alarm_too(fitted):
+    one = fitted(1)
+    timid = replace(one.problem, whitener=one.problem.whitener / 3.0)
+    residual = timid.residual(one.fit.theta)
+    found = against_stated(float(residual @ residual), one.fit.dof)
+    assert found.alarm is Alarm.BELOW_STATED
+
+
+def test_without_redundancy_nothing_is_said_about_noise(fitted):
+    found = against_stated(fitted(1).fit.chi2, 0)
+    assert found.alarm is Alarm.NO_REDUNDANCY
+    assert np.isnan(found.p_above)
+    assert np.isnan(found.noise_factor)
+
+
+def repeated(rng, bias):
+    """30 poses measured three times each: unit noise, and a bias of each pose that the model does not know."""
+    repeat = np.repeat(np.arange(30), 3)
+    return rng.normal(size=(90, 2)) + bias * rng.normal(size=(30, 2))[repeat], repeat
+
+
+def as_fit(fit, residual):
+    return replace(fit, chi2=float(np.sum(residual**2)), dof=residual.size)
+
+
+def test_misfit_that_repeats_is_lack_of_fit_whatever_noise_was_stated(fitted):
+    fit, rng = fitted(1).fit, np.random.default_rng(3)
+    for stated in (0.2, 1.0, 5.0):
+        honest, repeat = repeated(rng, 0.0)
+        missing, _ = repeated(rng, 2.0)
+        assert against_repeats(as_fit(fit, honest / stated), honest / stated, repeat).alarm is Alarm.NONE
+        found = against_repeats(as_fit(fit, missing / stated), missing / stated, repeat)
+        assert found.alarm is Alarm.LACK_OF_FIT
+        assert found.chi2_per_dof == pytest.approx(1.0 / stated**2, rel=0.3)
+        assert (found.groups, found.dof) == (30, 120)
+
+
+def test_rows_that_do_not_repeat_give_no_answer(fitted):
+    residual, _ = repeated(np.random.default_rng(4), 0.0)
+    fit = as_fit(fitted(1).fit, residual)
+    assert against_repeats(fit, residual, np.full(90, -1)) is None
+    assert against_repeats(fit, residual, np.arange(90)) is None
 
 
 def found_error_m(one):
@@ -107,3 +180,25 @@ def test_what_the_poses_hardly_show_counts_with_its_plausible_size(fitted):
     assert guess.status is FreeSpaceStatus.PREDICTED
     assert guess.guessed == (weak.plain,)
     assert 1e-4 < np.sqrt(guess.rms_m**2 - sure.rms_m**2) < 1e-3
+
+
+@pytest.fixture(autouse=True)
+def _one_bench(monkeypatch, bench):
+    monkeypatch.setattr(coverage, "Bench", lambda _: bench)
+
+
+@pytest.mark.parametrize("sessions", [20, pytest.param(60, marks=pytest.mark.endure)])
+def test_intervals_keep_their_word(request, sessions):
+    tally = coverage.run(request.config.rootpath / "rigs" / "ur5e-dual-psd.toml", sessions=sessions, seed=7)
+    assert tally.failed == 0
+    assert {key[0] for key in tally.stated} == {"tracker", "dual PSD"}
+    stated, held = sum(tally.stated.values()), sum(tally.held.values())
+    # members of a session share its noise: a sixth of the intervals count as independent, about four a session
+    low, high = binom.ppf([0.001, 0.999], stated // 6, coverage.LEVEL) / (stated // 6)
+    assert low <= held / stated <= high
+
+
+def test_what_is_not_determined_is_not_counted(request):
+    tally = coverage.run(request.config.rootpath / "rigs" / "ur5e-dual-psd.toml", sessions=2, seed=8)
+    assert tally.stated["dual PSD", "joint zero"] == 4  # joint 1 turns with the fixture, joint 6 with the laser
+    assert tally.stated["tracker", "device yaw"] == 0  # joint 1 turns with the device
