@@ -1,5 +1,5 @@
-"""poses.csv and touched points, read with the row and column of every fault, the rows of corrected.csv (docs/formats.md);
-and the frame that is measured from touched points.
+"""poses.csv and touched points, read with the row and column of every fault, and the rows of corrected.csv
+(docs/formats.md); besides the frame that is measured from touched points.
 
 Frames of a program, bases and work objects, are measured
 again with the arm as it really is: one that was taught with the uncorrected arm holds the error of that arm about its
