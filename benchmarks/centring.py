@@ -13,12 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from acquisition.centring.aim import BeamTarget, flange_for, reach
-from acquisition.centring.believed import BelievedArm, FixtureOptics
+from acquisition.centring.aim import BeamTarget, BelievedArm, FixtureOptics, flange_for, reach
 from acquisition.centring.loop import Centring, CentringStatus, Limits, Strategy, centre
-from acquisition.centring.measured import MeasuredStrategy
 from acquisition.centring.registered import FixedGuess, Registered
 from acquisition.centring.search import Found, Search
+from acquisition.centring.strategies import MeasuredStrategy
 from acquisition.errors import UnreachableError
 from acquisition.recording.rig import Rig
 from calibeam.learner import FittedLearner

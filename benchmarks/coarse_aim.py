@@ -16,11 +16,10 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from acquisition.centring.aim import BeamTarget, reach
-from acquisition.centring.by_camera import Aim, Aimed, CameraAim
 from acquisition.centring.camera.board import Board, Sight
 from acquisition.centring.camera.measuring import CameraMeasuring, MeasuredCamera
 from acquisition.centring.camera.model import CameraFit, CameraModel
-from acquisition.centring.search import Found, Search
+from acquisition.centring.search import Aim, Aimed, CameraAim, Found, Search
 from acquisition.errors import UnreachableError
 from acquisition.motion.kinematics import inverse, transform
 from acquisition.recording.rig import Rig, load_rig, plain_rig, rig_text

@@ -24,7 +24,7 @@ from acquisition.recording.rig.devices import PsdDriver, RobotDriver
 from acquisition.wires.attaching import Guarded
 from acquisition.wires.streams import Pump, Supervisor
 from calibeam.devices.encoders import emulated_encoders, encoder_driver
-from calibeam.devices.psd import emulated_psd, psd_driver
+from calibeam.devices.instruments import emulated_psd, psd_driver
 from calibeam.devices.robot import emulated_robot, robot_of
 from drivers.clock import Clock, SystemClock
 from drivers.device import Block, Device, Movable

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.guided.guide import GuidedProgress, Request
+from acquisition.guided.reading import GuidedProgress, Request
 from acquisition.guided.stillness import Window
 from calibeam.guided.run import wish
 from simulators.hand.held_arm import CannotReachError
@@ -14,7 +14,7 @@ COUNTS = 1 << 20  # of simulators/encoders/object_dictionary.py
 
 
 class DirectHand:
-    """Implements acquisition.guided.stillness.EncoderWatch and acquisition.guided.guide.Guide."""
+    """Implements acquisition.guided.stillness.EncoderWatch and acquisition.guided.reading.Guide."""
 
     def __init__(self, world: HandWorld, period_s: float = 0.025) -> None:
         self.world, self._period_s = world, period_s

@@ -24,9 +24,8 @@ from acquisition.guided.stillness import ArmMotion, GuidedArm, StillRule
 from acquisition.recording.rig import Rig, load_rig, plain_rig, rig_sha256, rig_text
 from benchmarks.direct_hand import COUNTS, DirectHand
 from benchmarks.slices import Slices
-from calibeam.guided.judge import FittedJudge
+from calibeam.guided.judge import FittedJudge, samples_of
 from calibeam.guided.recorded import BelievedGuidedArm
-from calibeam.guided.refit import samples_of
 from calibrate.fit.identify.identify import identify
 from calibrate.fit.identify.record import record_of
 from calibrate.fit.identify.result import Identification

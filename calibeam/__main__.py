@@ -3,7 +3,7 @@
 import sys
 
 from calibeam import check_folders
-from calibeam.interrupts import INTERRUPTS
+from calibeam.outcome import INTERRUPTS
 
 
 def main() -> None:

@@ -17,8 +17,7 @@ from acquisition.recording.files import brief
 from calibeam.command_list import COMMANDS, GROUPS
 from calibeam.console import Console, clean_streams
 from calibeam.emulation import EmulationError
-from calibeam.interrupts import INTERRUPTS
-from calibeam.outcome import CheckFailed, PartialResult, interruption
+from calibeam.outcome import INTERRUPTS, CheckFailed, PartialResult, interruption
 from calibeam.prove.seal import BrokenSealError
 from calibrate.errors import DataError
 from drivers.errors import DeviceError

@@ -14,8 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from simulators.arm.kinematics import Arm
-from simulators.arm.rigid import inverse
+from simulators.arm.kinematics import Arm, inverse
 from simulators.arm.statics import weigh
 from simulators.conceal.observe import on_their_plate, readings_at
 from simulators.conceal.readings import Stance, length_m, position_m, spots, stand, tip_m, true_shaft_rad

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.bench import Bench, Look
-from acquisition.centring.believed import BelievedArm
+from acquisition.centring.aim import BelievedArm
 
 Floats = NDArray[np.float64]
 

@@ -12,10 +12,9 @@ from numpy.typing import NDArray
 
 from acquisition.bench import Bench
 from acquisition.centring.aim import BeamTarget, between, flange_for, reach
-from acquisition.centring.by_camera import OTHER_ROLLS_RAD, Aim, Aimed
 from acquisition.centring.camera.board import Sight
 from acquisition.centring.loop import Centring, Limits, centre
-from acquisition.centring.search import Found, Search
+from acquisition.centring.search import OTHER_ROLLS_RAD, Aim, Aimed, Found, Search
 from acquisition.centring.strategies import REGISTERED, CentringChoice, fixture_after
 from acquisition.errors import NoLightError, SpotLostError, UnreachableError
 from acquisition.session.records import Events, Learner

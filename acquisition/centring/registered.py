@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
-from acquisition.centring.believed import BelievedArm, FixtureOptics, beam_by_joints, in_fixture, spots_at
+from acquisition.centring.aim import BelievedArm, FixtureOptics, beam_by_joints, in_fixture, spots_at
 from acquisition.centring.loop import Proposal
 
 Floats = NDArray[np.float64]

@@ -10,9 +10,18 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.guided.guide import Coverage, Guide, GuidedProgress, Request
 from acquisition.guided.plan import GuidedVisit, readings_of
-from acquisition.guided.reading import Cone, Judge, Reading, SphereSpot, Target
+from acquisition.guided.reading import (
+    Cone,
+    Coverage,
+    Guide,
+    GuidedProgress,
+    Judge,
+    Reading,
+    Request,
+    SphereSpot,
+    Target,
+)
 from acquisition.guided.stillness import ArmMotion, EncoderWatch, GuidedArm, StillRule, Window
 
 Floats = NDArray[np.float64]

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.bench import ArmReading, Look, Spot
-from acquisition.centring.believed import BelievedArm, FixtureOptics
+from acquisition.centring.aim import BelievedArm, FixtureOptics
 from acquisition.session.plan import PoseKey
 
 Floats = NDArray[np.float64]

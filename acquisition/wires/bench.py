@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.bench import ArmReading, Look
-from acquisition.motion.gated_arm import GatedArm
+from acquisition.motion.under_way import GatedArm
 from acquisition.wires.psd_view import PsdView, PsdWindow, psd_window
 from acquisition.wires.streams import Pump, Supervisor
 from drivers.clock import Clock

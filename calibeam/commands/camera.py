@@ -56,7 +56,7 @@ def camera_command(
         someone(at_terminal(), "whether the arm may move", YES).may_move()
     from acquisition.centring.camera.measuring import CameraMeasuring
     from acquisition.centring.camera.model import write_model
-    from calibeam.devices.camera import open_camera
+    from calibeam.devices.instruments import open_camera
     from calibeam.devices.recorder import RecordingJournal
     from calibeam.learner import FittedLearner
     from calibeam.software import SOFTWARE

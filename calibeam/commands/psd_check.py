@@ -16,7 +16,7 @@ from acquisition.recording.rig import load_rig
 from acquisition.recording.rig.devices import PsdDevice
 from acquisition.wires.psd_view import psd_window
 from calibeam.asking import Asking, NotAgreedError, at_terminal, someone
-from calibeam.devices.psd import PsdInstrument, psd_driver
+from calibeam.devices.instruments import PsdInstrument, psd_driver
 from calibeam.overwriting import writes
 from drivers.clock import SystemClock
 from drivers.device import Block

@@ -23,7 +23,6 @@ from acquisition.recording.rig.devices import (
 )
 from acquisition.wires.attaching import one_error_tree
 from acquisition.wires.psd_view import psd_window
-from calibeam.devices.camera import camera_sight
 from calibeam.devices.encoders import (
     bus_trouble,
     encoder_driver,
@@ -32,10 +31,9 @@ from calibeam.devices.encoders import (
     sample_rate,
     uneven_layers,
 )
+from calibeam.devices.instruments import camera_sight, place_of, psd_driver, psd_view, tracker_driver
 from calibeam.devices.others import other_drivers
-from calibeam.devices.psd import psd_driver, psd_view
 from calibeam.devices.robot import robot_of
-from calibeam.devices.tracker_of_rig import place_of, tracker_driver
 from drivers.clock import Clock
 from drivers.device import Block, Device
 from drivers.errors import DeviceError

@@ -18,10 +18,10 @@ from acquisition.wires.attaching import Guarded, Reopening
 from acquisition.wires.frame_log import FrameLog
 from acquisition.wires.streams import Pump
 from calibeam.devices.encoders import VIEWED, encoder_driver, identities_of, names_of
+from calibeam.devices.instruments import VIEWED as TRACKER_VIEWED
+from calibeam.devices.instruments import tracker_driver
 from calibeam.devices.recorder import uninterrupted
-from calibeam.devices.tracker_of_rig import VIEWED as TRACKER_VIEWED
-from calibeam.devices.tracker_of_rig import tracker_driver
-from calibeam.interrupts import ENDING, heard_by
+from calibeam.outcome import ENDING, heard_by
 from calibeam.site_log import SITE_LOG
 from calibeam.software import SOFTWARE
 from drivers.clock import Clock

@@ -27,9 +27,8 @@ from acquisition.session.session import Session
 from acquisition.session.stepping import Summary
 from acquisition.session.tracked import TrackedSample
 from calibeam.emulation import EmulationError
-from calibeam.interrupts import ENDING, heard_by
 from calibeam.learner import FittedLearner
-from calibeam.outcome import PartialResult, interruption
+from calibeam.outcome import ENDING, PartialResult, heard_by, interruption
 from calibeam.software import SOFTWARE
 from drivers.clock import Clock
 from drivers.errors import DeviceError

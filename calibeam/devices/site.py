@@ -8,7 +8,7 @@ from functools import partial
 from typing import Any, Generic, TypeVar
 
 from acquisition.errors import StoppedError
-from acquisition.motion.gated_arm import GatedArm
+from acquisition.motion.under_way import GatedArm
 from acquisition.recording import Channel, Event, RecordingError, RecordingWriter, RigFileError
 from acquisition.recording.rig import Rig
 from acquisition.recording.rig.devices import EncodersDevice, OtherDevice, PsdDevice, RobotDevice, TrackerDevice
@@ -19,12 +19,18 @@ from acquisition.wires.psd_view import PsdView, psd_window
 from acquisition.wires.streams import STALE_S, Pump, Supervisor
 from acquisition.wires.tracker_bench import TrackerBench
 from calibeam.devices.encoders import emulated_encoders, encoder_driver
+from calibeam.devices.instruments import VIEWED as TRACKER_VIEWED
+from calibeam.devices.instruments import (
+    PsdInstrument,
+    emulated_psd,
+    emulated_tracker,
+    psd_driver,
+    psd_view,
+    tracker_driver,
+)
 from calibeam.devices.others import emulated_others, other_drivers
-from calibeam.devices.psd import PsdInstrument, emulated_psd, psd_driver, psd_view
 from calibeam.devices.recorder import uninterrupted
 from calibeam.devices.robot import emulated_robot, robot_of
-from calibeam.devices.tracker_of_rig import VIEWED as TRACKER_VIEWED
-from calibeam.devices.tracker_of_rig import emulated_tracker, tracker_driver
 from calibeam.live.feed import PAGE_STOP, SILENT, Feed
 from calibeam.motion.gate_of_rig import gated_arm
 from calibrate.model.dual_psd_rig import fixture_of, laser_of

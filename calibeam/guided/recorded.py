@@ -11,9 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.guided.guide import Guide
 from acquisition.guided.plan import GuidedVisit
-from acquisition.guided.reading import Reading
+from acquisition.guided.reading import Guide, Reading
 from acquisition.guided.session import GuidedSession, GuidedSummary
 from acquisition.guided.stillness import WiredEncoderWatch
 from acquisition.motion.inverse.solve import AtPoint, refine, within

@@ -15,9 +15,8 @@ from rich.live import Live
 from rich.table import Table
 from rich.text import Text
 
-from acquisition.guided.guide import Guide, GuidedProgress, Request
 from acquisition.guided.plan import GuidedOptions, GuidedVisit, by_kind, calibration_plan, verification_plan
-from acquisition.guided.reading import BarEnd, Cone, Target
+from acquisition.guided.reading import BarEnd, Cone, Guide, GuidedProgress, Request, Target
 from acquisition.recording.rig import Rig
 from calibeam.console import Console
 from calibeam.devices.recorder import new_recording
@@ -31,7 +30,7 @@ REFRESH_HZ = 5.0
 
 
 class PersonGuide:
-    """Implements acquisition.guided.guide.Guide for a person who reads the terminal; it waits for nobody's key."""
+    """Implements acquisition.guided.reading.Guide for a person who reads the terminal; it waits for nobody's key."""
 
     def __init__(self, console: Console) -> None:
         self._console = console
@@ -110,7 +109,7 @@ CANNOT = "cannot put the probe"  # how simulators/hand/held_arm.py reports that 
 
 
 class EmulatedHand:
-    """Implements acquisition.guided.guide.Guide; what is reported goes on to `show`."""
+    """Implements acquisition.guided.reading.Guide; what is reported goes on to `show`."""
 
     def __init__(self, ask: Callable[..., Any], show: Callable[[GuidedProgress], None]) -> None:
         self._ask, self._show = ask, show

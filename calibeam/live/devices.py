@@ -10,10 +10,9 @@ from acquisition.recording.rig import Rig
 from acquisition.recording.rig.schema import Devices
 from acquisition.wires.attaching import Guarded, one_error_tree
 from calibeam.devices.encoders import encoder_driver
+from calibeam.devices.instruments import psd_driver, psd_view, tracker_driver
 from calibeam.devices.others import other_drivers
-from calibeam.devices.psd import psd_driver, psd_view
 from calibeam.devices.robot import robot_of
-from calibeam.devices.tracker_of_rig import tracker_driver
 from calibeam.live.feed import Feed
 from drivers.clock import Clock
 from drivers.device import Device

@@ -28,9 +28,9 @@ from acquisition.motion.states import OVER, MotionState
 from acquisition.recording.rig import Rig
 from calibeam.asking import YES, Asking, at_terminal, someone
 from calibeam.console import Console
-from calibeam.interrupts import INTERRUPTS, heard_by
 from calibeam.motion.gate_of_rig import cell_of, gate_of, solver_of
 from calibeam.motion.robot import streamed_robot
+from calibeam.outcome import INTERRUPTS, heard_by
 from drivers.clock import SystemClock
 from drivers.errors import DeviceError
 

@@ -8,11 +8,11 @@ from numpy.typing import NDArray
 from acquisition.motion.cell import Box, Cell, SlowArea
 from acquisition.motion.following import SetPoints, SetPointStream
 from acquisition.motion.gate import Gate
-from acquisition.motion.gated_arm import GatedArm
 from acquisition.motion.inverse.closed_form import closed_form
 from acquisition.motion.inverse.solve import Solver
 from acquisition.motion.paths.segments import Pace
 from acquisition.motion.setpoints import solve_rate_hz
+from acquisition.motion.under_way import GatedArm
 from acquisition.recording.rig import ArmModel, Rig
 from acquisition.wires.streams import Pump
 from calibeam.geometry_only import read_geometry

@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.errors import RefusedMotionError, TaskError
-from acquisition.motion.deviation import Deviation, deviation, rates_text
 from acquisition.motion.following import Followed
 from acquisition.motion.plan import Plan
 from acquisition.motion.run_task import Around, next_sweep, run_task
+from acquisition.motion.setpoints import Deviation, deviation, rates_text
 from acquisition.motion.task.program import unrolled
 from acquisition.motion.task.ready import missing, taught_text
 from acquisition.motion.task.task_file import Task, read_task

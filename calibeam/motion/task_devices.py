@@ -26,13 +26,13 @@ from acquisition.recording.files import parse_toml, read_text
 from acquisition.recording.files.bounds import ZERO, Rotation, Vector
 from acquisition.recording.rig import Rig
 from acquisition.wires.streams import Pump
-from calibeam.devices.camera import open_camera
 from calibeam.devices.encoders import encoder_driver
+from calibeam.devices.instruments import open_camera
 from calibeam.motion.robot import StreamedRobot
 from drivers.clock import Clock
 from drivers.device import Block
 from drivers.errors import DeviceRefused
-from drivers.ur.outputs import UrOutputs
+from drivers.ur.dashboard import UrOutputs
 
 if TYPE_CHECKING:
     from drivers.camera.device import Camera as CameraDevice

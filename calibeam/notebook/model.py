@@ -1,5 +1,9 @@
-"""An identified arm in a notebook: its numbers with their uncertainty, as tables and as an arm that computes."""
+"""An identified arm in a notebook: its numbers with their uncertainty, as tables and as an arm that computes.
 
+Tables are those of pandas where it is installed, which is not required.
+"""
+
+import importlib
 import math
 import warnings
 from collections.abc import Mapping
@@ -12,13 +16,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.recording import Samples
-from calibeam.notebook.tables import SCREEN, pandas_if_installed
 
 if TYPE_CHECKING:
     from calibeam.results.identification import JudgedModel
     from calibrate.apply.correct import Corrected, Wanted
     from calibrate.apply.predicting import Placed
     from calibrate.model.model_file import ModelFile, ModelParameter
+
+SCREEN = 30  # rows of a table that is shown by itself
+
+
+def pandas_if_installed() -> Any:
+    """The module where it is installed, else None."""
+    try:
+        return importlib.import_module("pandas")
+    except ImportError:
+        return None
+
 
 Floats = NDArray[np.float64]
 SAME = 1e-6  # of a rotation matrix: more than rounding, less than any slip

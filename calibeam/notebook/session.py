@@ -11,8 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.recording import Recording, RecordingError, Samples, SamplesError, read
-from calibeam.notebook.model import Model, model_of
-from calibeam.notebook.tables import SCREEN, pandas_if_installed
+from calibeam.notebook.model import SCREEN, Model, model_of, pandas_if_installed
 from calibrate.errors import DataError
 
 if TYPE_CHECKING:

@@ -8,18 +8,18 @@ from rich.text import Text
 
 from calibeam.console import Console
 from calibeam.printing.results import print_diagnosis
-from calibeam.results.comparison import (
-    SAYS,
+from calibeam.results.reconciliation import ReconcileFile
+from calibrate.compare import mismatches
+from calibrate.compare.comparison import (
     ComparisonFile,
     DifferenceRecord,
     DroppedRecord,
-    LinkRecord,
     ReadingRecord,
     StreamRecord,
 )
-from calibeam.results.reconciliation import ReconcileFile
-from calibrate.compare import mismatches
+from calibrate.compare.link_differs import Parted
 from calibrate.compare.mismatches import Level, in_words
+from calibrate.compare.rig_and_streams import SAYS
 from calibrate.model.effects.term import Size, with_sigma
 from calibrate.quantities import length, significant
 
@@ -120,7 +120,7 @@ def _rows(file: ComparisonFile) -> str:
     return f"{file.matched} samples in both" + "".join(f", {text}" for text in alone)
 
 
-def _chain(links: tuple[LinkRecord, ...]) -> Table:
+def _chain(links: tuple[Parted, ...]) -> Table:
     table = Table(title="settled samples, link by link", title_justify="left")
     for heading in ("link", "differ by (rms)", "of its own", "at most", "in", "noise", "found", "parts"):
         table.add_column(heading, justify="left" if heading in ("link", "in", "parts") else "right")

@@ -29,7 +29,7 @@ from acquisition.errors import StoppedError
 from acquisition.session.control import BROKEN, OVER, RunControl, RunState
 from acquisition.wires.streams import FROZEN_S
 from calibeam.asking import in_foreground
-from calibeam.interrupts import INTERRUPTS, heard_by
+from calibeam.outcome import INTERRUPTS, heard_by
 from drivers.clock import Clock, SystemClock
 
 ESC = "\x1b"

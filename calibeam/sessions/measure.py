@@ -16,13 +16,12 @@ from acquisition.session.records import Sample
 from acquisition.session.session import Session
 from acquisition.session.stepping import Summary
 from acquisition.wires.bench import ArmOnWires, WiredBench
-from calibeam.devices.camera import camera_sight
+from calibeam.devices.instruments import camera_sight
 from calibeam.devices.recorder import Earlier, RecordingJournal, end_event, kept, new_recording
 from calibeam.devices.site import connected
-from calibeam.interrupts import INTERRUPTS
 from calibeam.learner import FittedLearner
 from calibeam.live.feed import Feed
-from calibeam.outcome import PartialResult
+from calibeam.outcome import INTERRUPTS, PartialResult
 from calibeam.sessions.forecast import Ahead, Asked, Forecast, Forecaster, forecast
 from calibeam.sessions.job import STANDS_IN, Job, Part, notes_of
 from calibeam.sessions.keys import Keys

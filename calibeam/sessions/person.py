@@ -9,8 +9,7 @@ from acquisition.recording.rig import Rig
 from calibeam.asking import YES, Asking, someone
 from calibeam.console import Console
 from calibeam.devices.check import DeviceCheck, check_devices
-from calibeam.interrupts import INTERRUPTS
-from calibeam.outcome import PartialResult, interruption
+from calibeam.outcome import INTERRUPTS, PartialResult, interruption
 from calibeam.sessions.job import GO_ON
 from calibeam.sessions.keys import ENTER, Keys
 from calibeam.sessions.reporter import StatusReporter

@@ -10,7 +10,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.guided.guide import Coverage
+from acquisition.guided.reading import Coverage
 from acquisition.session.control import RunState
 from acquisition.session.records import Progress, Sample
 from calibeam.sessions.forecast import Forecast
@@ -70,7 +70,7 @@ class Quality:
     spots_m: Floats  # (4,) of the last sample
     sums_v: tuple[float, float]  # light on both faces
     spans_rad: Floats  # (joint,) widest way between two samples
-    marks: tuple[str, ...]  # a joint's range step by step: acquisition/guided/guide.py
+    marks: tuple[str, ...]  # a joint's range step by step: acquisition/guided/reading.py
 
 
 class QualityKeeper:

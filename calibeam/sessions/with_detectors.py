@@ -7,15 +7,14 @@ from dataclasses import replace
 
 from acquisition.recording.mcap import next_part
 from acquisition.recording.rig import Placement
-from acquisition.session.planned import check_planned
 from acquisition.session.records import Sample
+from acquisition.session.session import check_planned
 from acquisition.session.stepping import Summary
 from calibeam.asking import Asking
 from calibeam.console import Console
-from calibeam.interrupts import INTERRUPTS
 from calibeam.learner import FittedLearner
 from calibeam.live.feed import SILENT, Feed
-from calibeam.outcome import PartialResult, interruption
+from calibeam.outcome import INTERRUPTS, PartialResult, interruption
 from calibeam.sessions.forecast import ahead_of_blocks, ahead_of_plan
 from calibeam.sessions.job import (
     GO_ON,
@@ -102,7 +101,7 @@ class WithDetectors(OnSite):
 
     def _preview(self) -> None:
         """Gone through and drawn."""
-        from calibeam.motion.rehearsal_figure import draw_session  # matplotlib takes a second to load
+        from calibeam.motion.rehearsal import draw_session  # matplotlib takes a second to load
 
         part = self._part
         self._reporter.step("plan preview")

@@ -24,10 +24,9 @@ from calibeam.asking import Asking
 from calibeam.console import Console
 from calibeam.devices.recorder import Earlier, RecordingJournal, end_event, kept, new_recording
 from calibeam.devices.site import TrackerAddresses, connected_tracker
-from calibeam.interrupts import INTERRUPTS
 from calibeam.live.feed import SILENT, Feed, Progress
 from calibeam.motion.reachable_poses import candidates_of, way_is_clear
-from calibeam.outcome import PartialResult
+from calibeam.outcome import INTERRUPTS, PartialResult
 from calibeam.printing.progress import progress_bar
 from calibeam.rig_files import of_one_point
 from calibeam.sessions.job import GO_ON, PLAN_NOTE, SEED_NOTE, begun_in, plan_sha256

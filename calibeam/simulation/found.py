@@ -17,8 +17,7 @@ from calibrate.model.effects.ports import Place, Port
 from calibrate.model.effects.second_encoders import AGAINST, PLACES
 from calibrate.model.effects.term import Accepted, Term
 from calibrate.model.predict import Predictor
-from simulators.arm.kinematics import Arm, forward
-from simulators.arm.rigid import inverse
+from simulators.arm.kinematics import Arm, forward, inverse
 from simulators.arm.statics import Load, weigh
 from simulators.conceal.rig import DualPsd
 

@@ -11,7 +11,7 @@ from calibrate.model.effects.fixture_moved import CARRIED, ONE_BODY
 from calibrate.model.effects.hand_force import FORCE_N
 from calibrate.model.effects.term import Shape
 from calibrate.model.effects.time_laws import FOR_A_WHILE
-from simulators.arm.rigid import Vector
+from simulators.arm.kinematics import Vector
 from simulators.arm.statics import Load, Weight, carried_by, loaded_by
 from simulators.defects import Defect
 from simulators.defects.base import CarriedBase

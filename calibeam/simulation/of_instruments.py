@@ -27,7 +27,7 @@ from calibrate.model.sensors.kind import (
     Trait,
 )
 from simulators.arm.drawing import origin_and_rotation
-from simulators.arm.rigid import Vector
+from simulators.arm.kinematics import Vector
 from simulators.defects import Defect
 from simulators.defects.defect import as_vector
 from simulators.defects.detector import StrainedFace, StrayLight, WavesOnFace

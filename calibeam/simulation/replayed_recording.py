@@ -13,10 +13,9 @@ from scipy.spatial.transform import Rotation
 from acquisition.recording import Recording, RecordingWriter, Samples, readings_sha256
 from acquisition.recording.rig import Rig
 from acquisition.recording.samples import ORIENTATION, POSITION, SPOTS, WIRE, per_joint
-from calibeam.simulation.noise import Noise, noise_of
 from calibeam.simulation.physics import Physics, physics_of
 from calibeam.simulation.rig_in_numbers import rigged
-from calibeam.simulation.scene_of_samples import Clock, scene_of
+from calibeam.simulation.scene_of_samples import Clock, Noise, noise_of, scene_of
 from calibeam.software import SOFTWARE
 from calibrate.errors import DataError
 from calibrate.model.model_file import ModelFile

@@ -23,8 +23,7 @@ from calibrate.model.sensors.bar import bar_pairs
 from calibrate.model.sensors.position import seen_at
 from calibrate.model.sensors.spots import dual_psd_of
 from simulators.arm.drawing import Drawing, Row, turning_com_m
-from simulators.arm.kinematics import Arm
-from simulators.arm.rigid import shifted
+from simulators.arm.kinematics import Arm, shifted
 from simulators.conceal.rig import DualPsd
 from simulators.replayed import Mounted, Rigged
 

@@ -33,7 +33,9 @@ NUDGE_RAD = 1e-6  # of a joint, for its lever on the readings
 
 @dataclass(frozen=True)
 class Parted:
-    """One link, judged. `noise` is one sigma of a difference; None: unknown."""
+    """One link over the matched samples, judged; `own`: without what the links in front explain. Times are those of
+    the measured samples.
+    """
 
     link: str
     unit: str
@@ -41,15 +43,15 @@ class Parted:
     rms_raw: float
     rms_own: float
     largest_own: float
-    largest_row: int  # of the pair
-    largest_channel: str
-    noise: float | None
+    largest_column: str
+    largest_t_s: float
+    noise: float | None  # one sigma of a difference; None: unknown
     noise_from: str
     p: float | None
     parts: bool
-    first_row: int | None  # of the pair: from where it is beyond its noise
-    offset: tuple[float, ...]  # (channel,) mean of the own difference
-    scatter: float  # of the own difference from row to row: the noise that was found
+    first_t_s: float | None  # from where it is beyond its noise
+    mean_own: tuple[float, ...]
+    scatter: float  # from row to row: the noise that was found
 
 
 def judged(differences: tuple[Difference, ...], model: Predictor, pair: Pair) -> tuple[Parted, ...]:
@@ -61,11 +63,11 @@ def judged(differences: tuple[Difference, ...], model: Predictor, pair: Pair) ->
 
 def _as_input(one: Parted) -> Parted:
     """Without set-points the joints are where each arm stood, which the links behind them take into account."""
-    return replace(one, parts=False, first_row=None)
+    return replace(one, parts=False, first_t_s=None)
 
 
 def _judged(one: Difference, model: Predictor, pair: Pair, links: int) -> Parted:
-    own, good = one.own, np.isfinite(one.own)
+    own, good, t_s = one.own, np.isfinite(one.own), pair[0].column("t_s")
     sigma, where = _noise(one, model, pair)
     at_row, at_channel = np.unravel_index(int(np.nanargmax(np.abs(own))), own.shape)
     largest = float(np.abs(own[at_row, at_channel]))
@@ -83,7 +85,7 @@ def _judged(one: Difference, model: Predictor, pair: Pair, links: int) -> Parted
         beyond = np.abs(own) > 4.0 * sigma
     if parts:
         rows = np.flatnonzero(np.any(beyond & good, axis=1))
-        first = int(rows[0]) if len(rows) else int(np.flatnonzero(good.any(axis=1))[0])
+        first = float(t_s[rows[0] if len(rows) else np.flatnonzero(good.any(axis=1))[0]])
     scatter = scatter_of(own)
     scatter = scatter[np.isfinite(scatter)]
     return Parted(
@@ -93,8 +95,8 @@ def _judged(one: Difference, model: Predictor, pair: Pair, links: int) -> Parted
         float(np.sqrt(np.nanmean(one.raw**2))),
         float(np.sqrt(np.nanmean(own**2))),
         largest,
-        int(at_row),
         one.names[int(at_channel)],
+        float(t_s[at_row]),
         None if sigma is None else float(np.median(sigma[good])),
         where,
         p,

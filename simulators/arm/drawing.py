@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from simulators.arm.rigid import Vector, moved, shifted, turned
+from simulators.arm.kinematics import Vector, moved, shifted, turned
 
 Floats = NDArray[np.float64]
 Model = Literal["dh", "mdh", "local-poe"]

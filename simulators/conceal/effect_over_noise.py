@@ -14,8 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from simulators.arm.kinematics import forward, jacobian
-from simulators.arm.rigid import moved
+from simulators.arm.kinematics import forward, jacobian, moved
 from simulators.conceal.observe import Observed, observe, seated_tip_m
 from simulators.conceal.plan import Timetable
 from simulators.conceal.rig import ENCODER_RAD, Artefacts, Device, DualPsd, Spread, TrueRig

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simulators.arm.drawing import Drawing, Row
-from simulators.arm.rigid import moved
+from simulators.arm.kinematics import moved
 from simulators.conceal.case import Case, HiddenMechanism, columns_of, hide, site_of
 from simulators.conceal.effect_over_noise import INVISIBLE, measure_distances, scale_of
 from simulators.conceal.observe import Observed, observe

@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from simulators.arm.kinematics import Arm, forward, reach_pose, within_limits
-from simulators.arm.rigid import inverse, moved, turned
+from simulators.arm.kinematics import Arm, forward, inverse, moved, reach_pose, turned, within_limits
 from simulators.conceal.rig import DualPsd, TrueRig
 
 Floats = NDArray[np.float64]

@@ -17,8 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from simulators.arm.kinematics import Arm, Frames, forward
-from simulators.arm.rigid import inverse, shifted
+from simulators.arm.kinematics import Arm, Frames, forward, inverse, shifted
 from simulators.arm.statics import Load, weigh
 from simulators.conceal.rig import Device, DualPsd, TrueRig
 from simulators.defects import Light, Scene

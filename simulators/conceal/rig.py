@@ -8,8 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from simulators.arm.kinematics import Arm
-from simulators.arm.rigid import moved
+from simulators.arm.kinematics import Arm, moved
 
 Floats = NDArray[np.float64]
 Whole = NDArray[np.int64]

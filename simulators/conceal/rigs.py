@@ -7,8 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simulators.arm.drawing import Drawing, Row, as_local_poe, fixed_parts, turning_com_m
-from simulators.arm.kinematics import Arm
-from simulators.arm.rigid import moved, turned
+from simulators.arm.kinematics import Arm, moved, turned
 from simulators.conceal.poses import reachable_share
 from simulators.conceal.rig import Artefacts, Device, DualPsd, Spread, TrueRig, perturbed
 from simulators.conceal.wanted import ConcealError, Wanted

@@ -6,7 +6,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from simulators.arm.rigid import turned
+from simulators.arm.kinematics import turned
 from simulators.arm.statics import Load
 from simulators.defects.defect import ANY_INSTRUMENT, ROBOT, Defect, UnderWeights
 from simulators.defects.displacement import BriefShift, Bump, CarriedPart, Displacement, Settling

@@ -12,7 +12,7 @@ from typing import Any, ClassVar, Protocol, Self, TypeVar, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
-from simulators.arm.rigid import Vector
+from simulators.arm.kinematics import Vector
 from simulators.arm.statics import Load, Weight, carried_by, loaded_by
 from simulators.defects.scene import Light, Scene, Site
 

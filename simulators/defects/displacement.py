@@ -6,7 +6,7 @@ from typing import ClassVar, Literal, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from simulators.arm.rigid import Vector, moved, shifted, turned_about
+from simulators.arm.kinematics import Vector, moved, shifted, turned_about
 from simulators.defects.defect import Defect, direction
 from simulators.defects.scene import Scene, Site
 

@@ -6,8 +6,7 @@ from typing import ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from simulators.arm.kinematics import forward
-from simulators.arm.rigid import Vector
+from simulators.arm.kinematics import Vector, forward
 from simulators.arm.statics import Load, weigh
 from simulators.defects.defect import ROBOT, Defect, UnderWeights, as_vector, direction, phase
 from simulators.defects.scene import Scene, Site, UnsuitedError

@@ -6,7 +6,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from simulators.arm.rigid import Vector
+from simulators.arm.kinematics import Vector
 from simulators.defects.defect import SPOTS, Defect, direction
 from simulators.defects.displacement import BriefShift, Bump, CarriedPart
 from simulators.defects.scene import Scene, Site

@@ -12,7 +12,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from simulators.arm.rigid import Vector, inverse, moved
+from simulators.arm.kinematics import Vector, inverse, moved
 from simulators.arm.statics import Load
 from simulators.defects.defect import ANY_INSTRUMENT, UNKNOWN, Defect
 from simulators.defects.scene import Light, Scene

@@ -6,7 +6,7 @@ from typing import ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from simulators.arm.rigid import Vector, shifted, turned, turned_about
+from simulators.arm.kinematics import Vector, shifted, turned, turned_about
 from simulators.arm.statics import Load
 from simulators.defects.defect import ANY_INSTRUMENT, ROBOT, Defect, UnderWeights, phase
 from simulators.defects.scene import Scene, Site

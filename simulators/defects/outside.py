@@ -6,7 +6,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from simulators.arm.rigid import Vector, turned
+from simulators.arm.kinematics import Vector, turned
 from simulators.arm.statics import Load
 from simulators.defects.defect import ANY_INSTRUMENT, UNKNOWN, Defect, direction, phase
 from simulators.defects.detector import PsdDefect, either_psd

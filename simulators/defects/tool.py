@@ -6,7 +6,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from simulators.arm.rigid import Vector, shifted, turned_about
+from simulators.arm.kinematics import Vector, shifted, turned_about
 from simulators.arm.statics import Load
 from simulators.defects.defect import ROBOT, SPOTS, Defect, as_vector, direction
 from simulators.defects.displacement import BriefShift, Bump, CarriedPart

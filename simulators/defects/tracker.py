@@ -6,7 +6,7 @@ from typing import Literal, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from simulators.arm.rigid import turned
+from simulators.arm.kinematics import turned
 from simulators.defects.defect import Defect, phase
 from simulators.defects.displacement import Bump, CarriedPart, Displacement, Settling
 from simulators.defects.scene import Scene, Site

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from simulators.arm.rigid import moved
+from simulators.arm.kinematics import moved
 from simulators.errors import WorldError
 
 Vector = tuple[float, float, float]

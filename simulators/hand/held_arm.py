@@ -22,8 +22,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from simulators.arm.kinematics import Arm, Frames, forward, jacobian
-from simulators.arm.rigid import moved
+from simulators.arm.kinematics import Arm, Frames, forward, jacobian, moved
 from simulators.defects.encoder import RADIUS_M
 from simulators.hand.hand_rig import HandEmulation, HandRig, HandTruth, TrueAxis, TrueRunout
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from simulators.arm.rigid import Vector
+from simulators.arm.kinematics import Vector
 from simulators.defects.defect import Mechanism, direction, spread
 from simulators.streams.course import STEP_S, Course, swung
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from simulators.arm.rigid import turned
+from simulators.arm.kinematics import turned
 from simulators.arm.statics import Load
 from simulators.conceal.case import Case
 from simulators.conceal.case_files import at_start

@@ -20,8 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from simulators.arm.kinematics import Arm, Frames
-from simulators.arm.rigid import inverse, moved
+from simulators.arm.kinematics import Arm, Frames, inverse, moved
 from simulators.arm.statics import Load, weigh
 from simulators.conceal.readings import FULL_SUM_V
 from simulators.defects import Light, Scene

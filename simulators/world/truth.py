@@ -15,8 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from simulators.arm.kinematics import Arm
-from simulators.arm.rigid import moved, shifted, turned
+from simulators.arm.kinematics import Arm, moved, shifted, turned
 from simulators.errors import WorldError
 from simulators.world.rig import Emulation, Joint, Placement, Pose, Tool, Vector, WorldRig, read_rig
 

@@ -18,7 +18,7 @@ import msgspec
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from simulators.arm.rigid import moved
+from simulators.arm.kinematics import moved
 from simulators.defects import Defect
 from simulators.errors import WorldError
 from simulators.world.body import ArmBody

@@ -101,7 +101,7 @@ def command(monkeypatch, tmp_path, quick) -> Callable[[str], list[str]]:
     monkeypatch.setattr(on_site, "devices_ready", lambda *_: None)
     monkeypatch.setattr(WithDetectors, "_preview", lambda *_: None)
     monkeypatch.setattr(WithDetectors, "_measure", moves)
-    monkeypatch.setattr("calibeam.devices.camera.open_camera", moves)
+    monkeypatch.setattr("calibeam.devices.instruments.open_camera", moves)
     monkeypatch.setattr(centre, "connected", moves)
     monkeypatch.setattr(with_tracker, "connected_tracker", moves)
     write_pose_plan(tmp_path / "plan.toml", PosePlan(1, "ur5e-tracker", (PlannedBlock((PlannedPose((0.0,) * 6),)),)))

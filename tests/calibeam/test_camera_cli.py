@@ -13,7 +13,7 @@ from acquisition.recording import RecordingWriter, RigFileError, read
 from acquisition.recording.rig import load_rig, rig_text
 from acquisition.session.plan import PlanOptions
 from calibeam.cli import run
-from calibeam.devices.camera import camera_sight
+from calibeam.devices.instruments import camera_sight
 from calibeam.devices.recorder import record_session
 from calibeam.devices.site import addresses_of, connected
 from calibeam.emulation import Emulation

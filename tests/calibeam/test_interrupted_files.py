@@ -14,8 +14,7 @@ import pytest
 
 from acquisition.recording.files import write_json
 from calibeam.cli import run
-from calibeam.interrupts import Interrupts
-from calibeam.outcome import taken_back
+from calibeam.outcome import Interrupts, taken_back
 from tests.calibeam.test_compare_simulations import EXAMPLES, arm, session
 
 ROWS = 48

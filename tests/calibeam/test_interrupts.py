@@ -6,7 +6,7 @@ import sys
 
 import pytest
 
-from calibeam.interrupts import Interrupts
+from calibeam.outcome import Interrupts
 
 # Ten Ctrl-C while it cleans up, and ten more while the interpreter ends.
 ENDS = """

@@ -10,7 +10,7 @@ import pytest
 from acquisition.recording.rig import load_rig
 from calibeam.cli import run
 from calibeam.commands import psd_check
-from calibeam.devices.psd import emulated_psd, psd_driver, psd_view
+from calibeam.devices.instruments import emulated_psd, psd_driver, psd_view
 from drivers.clock import SystemClock
 from drivers.errors import DeviceRefused
 from drivers.psd_error_map import ErrorMap

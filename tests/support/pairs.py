@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from calibeam.cli import run
-from simulators.arm.rigid import moved, shifted, turned_about
+from simulators.arm.kinematics import moved, shifted, turned_about
 from simulators.conceal.observe import observe
 from simulators.conceal.rig import DualPsd, TrueRig
 from tests.support.halves import OBSERVED, written_halves

@@ -11,7 +11,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.centring.believed import BelievedArm
+from acquisition.centring.aim import BelievedArm
 from acquisition.centring.camera.model import CameraModel
 from acquisition.motion.kinematics import apart, flange, inverse
 from acquisition.recording.rig.schema import CameraBoard

@@ -17,8 +17,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from acquisition.bench import Bench
-from acquisition.centring.aim import BeamTarget, flange_for, laser_in_flange, reach
-from acquisition.centring.believed import BelievedArm
+from acquisition.centring.aim import BeamTarget, BelievedArm, flange_for, laser_in_flange, reach
 from acquisition.centring.camera.board import Board, Eye, Sight
 from acquisition.centring.camera.calibration import Calibration, CameraStatus, View, calibrate_camera
 from acquisition.centring.camera.model import CameraFit, CameraModel, drawn

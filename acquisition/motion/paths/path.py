@@ -17,9 +17,8 @@ from numpy.typing import NDArray
 from acquisition.errors import RefusedMotionError, UnreachableError
 from acquisition.motion.inverse.solve import Solver
 from acquisition.motion.kinematics import apart
-from acquisition.motion.paths.blend import Blend, blend, state_of
 from acquisition.motion.paths.legs import JointLeg, Leg, LineLeg, drive_between
-from acquisition.motion.paths.segments import By, Pace, Place, Segment
+from acquisition.motion.paths.segments import Blend, By, Pace, Place, Segment, blend, state_of
 
 Floats = NDArray[np.float64]
 

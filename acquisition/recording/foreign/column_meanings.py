@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 from types import MappingProxyType
 
 from acquisition.recording.errors import SamplesError, shown
-from acquisition.recording.files.quantity import suffix_of
+from acquisition.recording.files.explain import suffix_of
 from acquisition.recording.foreign.heading_units import folded, split_heading, unit_of
 from acquisition.recording.foreign.rotations import CONVENTIONS
 from acquisition.recording.foreign.sheet import Sheet

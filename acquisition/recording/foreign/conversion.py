@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from acquisition.recording.errors import RecordingError, SamplesError, shown
 from acquisition.recording.files import write_json
-from acquisition.recording.files.quantity import spelt, suffix_of
+from acquisition.recording.files.explain import spelt, suffix_of
 from acquisition.recording.foreign.column_meanings import (
     CAMERA,
     POSE_MATRIX,

@@ -11,7 +11,7 @@ from functools import lru_cache
 from types import MappingProxyType
 
 from acquisition.recording.files.bounds import TABLE_COLUMNS
-from acquisition.recording.files.quantity import UNITS
+from acquisition.recording.files.explain import UNITS
 
 
 @dataclass(frozen=True)

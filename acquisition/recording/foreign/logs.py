@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.recording.errors import RecordingError, SamplesError, shown
-from acquisition.recording.files.quantity import spelt
+from acquisition.recording.files.explain import spelt
 from acquisition.recording.foreign.column_meanings import CAMERA, POSE_MATRIX, TIME, UNUSED, Group, clauses, name_of
 from acquisition.recording.foreign.conversion import (
     EPOCH_S,

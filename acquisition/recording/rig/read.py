@@ -10,8 +10,7 @@ import msgspec
 
 from acquisition.recording.errors import RigFileError, shown
 from acquisition.recording.files.bounds import most_of
-from acquisition.recording.files.explain import KeyPath, spelled, unknown_key
-from acquisition.recording.files.quantity import si_value, suffix_of
+from acquisition.recording.files.explain import KeyPath, si_value, spelled, suffix_of, unknown_key
 from acquisition.recording.files.toml_file import TomlFile, parse_toml, read_text
 from acquisition.recording.rig.rules import faults
 from acquisition.recording.rig.schema import EMULATION_KEYS, ArmModel, Rig

@@ -6,8 +6,7 @@ in as an argument: motion has the one that there is.
 """
 
 from calibrate.apply.correct.corrected import Arms, Corrected, FrameError, Options, Wanted, correct
-from calibrate.apply.correct.frames import measured_frame
-from calibrate.apply.correct.tables import corrected_rows, read_points, read_poses
+from calibrate.apply.correct.tables import corrected_rows, measured_frame, read_points, read_poses
 
 __all__ = [
     "Arms",

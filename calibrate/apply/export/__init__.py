@@ -3,11 +3,11 @@
 What a form cannot carry is stated in numbers.
 """
 
-from calibrate.apply.export.dh_csv import dh_arm, dh_table_of
+from calibrate.apply.export.controllers import BODIES
+from calibrate.apply.export.dh_table import dh_arm, dh_table_of
 from calibrate.apply.export.export import ExportForm, FormName, export_model, form_named
 from calibrate.apply.export.identified import IdentifiedArm, identified_arm
 from calibrate.apply.export.nominal_table import cells, nominal_table
-from calibrate.apply.export.ur import BODIES
 
 __all__ = [
     "BODIES",

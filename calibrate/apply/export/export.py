@@ -1,4 +1,4 @@
-"""An identified arm to the file of another program; a new form is one file beside this one and one line here.
+"""An identified arm to the file of another program; a new form is one function beside this file and one line here.
 
 Forms of installed packages are entry points of the group `calibeam.exports`.
 """
@@ -12,10 +12,7 @@ from acquisition.recording.files import cleaned
 from acquisition.recording.output import OutputKind, text_output, write_output
 from acquisition.recording.rig import Make, Rig
 from acquisition.recording.rig.devices import RobotDriver
-from calibrate.apply.export.dh_csv import dh_csv_text
-from calibrate.apply.export.identified import IdentifiedArm, identified_arm
-from calibrate.apply.export.json_text import json_text
-from calibrate.apply.export.mastering import (
+from calibrate.apply.export.controllers import (
     ABB,
     FANUC,
     KUKA,
@@ -23,13 +20,14 @@ from calibrate.apply.export.mastering import (
     fanuc_mastering_text,
     kuka_mastering_text,
     refused,
+    ur_calibration_text,
+    ur_kinematics_text,
     without_ratio,
 )
-from calibrate.apply.export.matlab import matlab_text
-from calibrate.apply.export.mjcf import mjcf_text
-from calibrate.apply.export.nominal_table import nominal_table_text
-from calibrate.apply.export.ur import ur_calibration_text, ur_kinematics_text
-from calibrate.apply.export.urdf import urdf_text
+from calibrate.apply.export.dh_table import dh_csv_text, matlab_text
+from calibrate.apply.export.identified import IdentifiedArm, identified_arm
+from calibrate.apply.export.nominal_table import json_text, nominal_table_text
+from calibrate.apply.export.robot_description import mjcf_text, urdf_text
 from calibrate.errors import DataError
 from calibrate.fit.fit_plan import ZEROS_ONLY_COMMAND
 from calibrate.model.effect_records import Effect

@@ -1,23 +1,26 @@
-"""Every number of the nominal arm, its correction, and as calibrated: in degrees and mm, in the robot's signs.
+"""Every number of the nominal arm, its correction, and as calibrated: in degrees and mm, in the signs of the robot.
 
 Axes are angles at a reading of zero, in the senses and couplings of the controller: an axis that reads r stands at
 r + value. Links are the numbers of the arm model. A correction of a D-H table adds to the drawn number. Of a local-POE
 arm, x, y, z are those of the next axis seen in its own frame, to which the correction adds, and turns are separated
 from the drawn part, so they are drawn as zero. Where the recording determines no number, the reason stands in its
 place. An arm that was fitted as poses has the rows of its D-H table, where the model holds what is determined of it.
+As CSV the table stands alone; as JSON beside the fixed parts as matrices and the D-H table of the same arm.
 """
 
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+import msgspec
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from acquisition.recording.rig import ArmModel, Joint, Make, Pose
-from calibrate.apply.export.dh_csv import dh_arm
+from calibrate.apply.export.dh_table import FRAME, TABLE, dh_arm, dh_numbers
 from calibrate.apply.export.identified import NO_NUMBER, IdentifiedArm
 from calibrate.fit.rank import in_plain_words, plainly
+from calibrate.model.arms.convert import convert, pose_of
 from calibrate.model.arms.coupled_readings import by_reading
 from calibrate.quantities import decimals_of, fixed
 
@@ -153,3 +156,37 @@ def _row(
 
 def _short(number: float) -> float:
     return round(number, 9) + 0.0  # a pm, a hundredth of a nrad: no rounding errors such as 4.9e-14 mm, no -0.0
+
+
+def json_text(arm: IdentifiedArm) -> str:
+    """The file's text; `convention` explains the other keys."""
+    new = convert(arm.rig.arm, ArmModel.DH, arm.corrections)
+    base, flange = pose_of(new.T_base_new), new.arm.flange
+    content = {
+        "schema": 1,
+        "kind": "calibeam-arm",
+        "name": arm.rig.name,
+        "convention": {
+            "units": "m, rad",
+            "sign": arm.sign,
+            "parts": "T_base_flange = F_0 Rz(q_1) F_1 ... Rz(q_n) F_n; 4x4 row by row",
+            "dh": "T_base_flange = base T_1 ... T_n flange; T_i = Rz(q_i + theta_offset) Tz(d) Tx(a) Rx(alpha)"
+            " Ry(tilt); rx, ry, rz is a rotation vector",
+            "table": "degrees and millimetres, in the robot's own signs; calibrated = nominal + correction",
+            "tool_point_m": "in the flange frame",
+        },
+        "joints": [{"lower_rad": low, "upper_rad": high} for low, high in arm.limits_rad],
+        "parts": arm.parts.tolist(),
+        "dh": {
+            "base": dict(zip(FRAME, (*base.origin_m, *base.rotation_rad), strict=True)),
+            "rows": [dict(zip(TABLE, row, strict=True)) for row in dh_numbers(new)],
+            "flange": dict(zip(FRAME, (*flange.origin_m, *flange.rotation_rad), strict=True)),
+        },
+        "table": nominal_table(arm),
+        "tool_point_m": arm.tool_m,
+        "not_carried": arm.not_carried,
+    }
+    matrix = by_reading(arm.rig.arm)
+    if matrix is not None:
+        content["angles_by_readings"] = matrix.tolist()  # q = matrix times readings
+    return msgspec.json.format(msgspec.json.encode(content), indent=1).decode() + "\n"

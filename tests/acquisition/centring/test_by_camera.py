@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from acquisition.centring.aim import BeamTarget
-from acquisition.centring.by_camera import Aim, Aimed
 from acquisition.centring.camera.board import Board, Grey, Sight, board_poses
 from acquisition.centring.camera.model import drawn
 from acquisition.centring.navigator import Navigator
+from acquisition.centring.search import Aim, Aimed
 from acquisition.errors import RefusedMotionError
 from acquisition.motion.kinematics import apart, transform
 from acquisition.recording.rig import load_rig, plain_rig, rig_text

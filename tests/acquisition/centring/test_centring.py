@@ -8,8 +8,8 @@ import pytest
 
 from acquisition.bench import Look, Spot
 from acquisition.centring.loop import CentringStatus, Limits, Proposal, centre
-from acquisition.centring.measured import MeasuredStrategy
 from acquisition.centring.registered import FixedGuess, Registered
+from acquisition.centring.strategies import MeasuredStrategy
 from benchmarks.centring import random_start
 from benchmarks.centring import run as benchmark
 

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from acquisition.centring.measured import MeasuredStrategy
 from acquisition.centring.registered import LEAST_GRIP, grip, rolled
+from acquisition.centring.strategies import MeasuredStrategy
 from benchmarks.centring import random_start
 from calibeam.learner import FittedLearner
 

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from acquisition.centring.aim import BeamTarget, between, flange_for, reach
-from acquisition.centring.believed import spots_at
+from acquisition.centring.aim import BeamTarget, between, flange_for, reach, spots_at
 from acquisition.errors import UnreachableError
 from calibeam.learner import FittedLearner
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from acquisition.guided.guide import Coverage
+from acquisition.guided.reading import Coverage
 
 LOW, HIGH = np.array([-np.pi, -1.0]), np.array([np.pi, 1.0])
 

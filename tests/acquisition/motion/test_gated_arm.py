@@ -5,7 +5,7 @@ import pytest
 
 from acquisition.errors import RefusedMotionError
 from acquisition.motion.cell import Box, Cell, SlowArea
-from acquisition.motion.gated_arm import GatedArm
+from acquisition.motion.under_way import GatedArm
 from tests.acquisition.motion.conftest import ur5e
 
 ARM = ur5e()

@@ -11,10 +11,9 @@ from acquisition.errors import RefusedMotionError
 from acquisition.motion.inverse.closed_form import closed_form
 from acquisition.motion.inverse.solve import Solver
 from acquisition.motion.kinematics import apart, inverse, transform
-from acquisition.motion.paths.blend import BlendState, blend
 from acquisition.motion.paths.legs import drive_between
 from acquisition.motion.paths.path import BeltState, Path
-from acquisition.motion.paths.segments import By, Pace, Place, Segment
+from acquisition.motion.paths.segments import BlendState, By, Pace, Place, Segment, blend
 from tests.acquisition.motion.conftest import ur5e
 from tests.acquisition.motion.continuity import jumps
 

@@ -4,14 +4,13 @@ import numpy as np
 import pytest
 
 from acquisition.motion.cell import Cell
-from acquisition.motion.deviation import deviation, rates_text
 from acquisition.motion.inverse.closed_form import closed_form
 from acquisition.motion.inverse.solve import Solver
 from acquisition.motion.kinematics import inverse, transform
 from acquisition.motion.paths.path import BeltState, Path
 from acquisition.motion.paths.segments import By, Pace, Place, Segment
 from acquisition.motion.plan import plan
-from acquisition.motion.setpoints import SERVO_PER_STRUCTURAL, LookAhead, solve_rate_hz
+from acquisition.motion.setpoints import SERVO_PER_STRUCTURAL, LookAhead, deviation, rates_text, solve_rate_hz
 from tests.acquisition.motion.conftest import ur5e
 
 SOLVER = Solver(ur5e(), closed_form(ur5e()))

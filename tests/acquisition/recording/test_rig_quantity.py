@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from acquisition.recording.files.quantity import si_name, si_value, suffix_of
+from acquisition.recording.files.explain import si_name, si_value, suffix_of
 
 
 @pytest.mark.parametrize(

@@ -10,8 +10,7 @@ from acquisition.errors import AcquisitionError
 from acquisition.recording import RigFileError
 from acquisition.recording.pose_plan import PlannedBlock, PlannedPose, PosePlan, read_pose_plan, write_pose_plan
 from acquisition.session.plan import PlanOptions
-from acquisition.session.planned import check_planned
-from acquisition.session.session import Session
+from acquisition.session.session import Session, check_planned
 from calibeam.learner import FittedLearner
 
 from .test_session import Kept

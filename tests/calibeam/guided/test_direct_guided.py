@@ -10,9 +10,8 @@ from acquisition.guided.reading import BarEnd, Cone, Reading
 from acquisition.guided.session import GuidedSession, GuidedSummary
 from acquisition.recording.rig import load_rig, plain_rig, rig_sha256, rig_text
 from benchmarks.direct_hand import DirectHand
-from calibeam.guided.judge import FittedJudge
+from calibeam.guided.judge import FittedJudge, samples_of
 from calibeam.guided.recorded import BelievedGuidedArm
-from calibeam.guided.refit import samples_of
 from calibrate.fit.identify.identify import identify
 from calibrate.fit.identify.record import record_of
 from calibrate.fit.solvers import Status

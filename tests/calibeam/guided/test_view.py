@@ -5,8 +5,7 @@ import io
 import numpy as np
 from rich.console import Console
 
-from acquisition.guided.guide import Coverage, GuidedProgress, Request
-from acquisition.guided.reading import BarEnd, Cone
+from acquisition.guided.reading import BarEnd, Cone, Coverage, GuidedProgress, Request
 from calibeam.guided.run import PersonGuide, drawn
 
 CONE = Cone(2, (0.5, 0.1, 0.0))

@@ -8,8 +8,8 @@ import pytest
 from acquisition.errors import InterruptedMotionError
 from acquisition.motion.states import MotionEvent, MotionState, after
 from calibeam.asking import Asking
-from calibeam.interrupts import INTERRUPTS
 from calibeam.motion.by_hand import ARRIVED_RAD, WORDS, MotionKeys, ending_words, keys_of
+from calibeam.outcome import INTERRUPTS
 
 PATIENCE_S = 30.0
 

@@ -10,8 +10,7 @@ from acquisition.recording.pose_plan import PlannedBlock, PlannedPose, PosePlan
 from acquisition.recording.rig import Rig, load_rig
 from acquisition.recording.rig.schema import MotionBox
 from acquisition.session.plan import PlanOptions
-from calibeam.motion.rehearsal import rehearse
-from calibeam.motion.rehearsal_figure import draw_session
+from calibeam.motion.rehearsal import draw_session, rehearse
 
 RIG = Path(__file__).parents[3] / "rigs" / "ur5e-dual-psd.toml"
 FEW = PlanOptions(centred=1, off_centre=1, repeats=0)

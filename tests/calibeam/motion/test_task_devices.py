@@ -14,7 +14,7 @@ from calibeam.motion.task_by_hand import recorded_poses
 from calibeam.motion.task_devices import EncoderBelt, OutputHand, part_in_file
 from drivers.device import Block
 from drivers.errors import DeviceLost, DeviceRefused
-from drivers.ur.outputs import UrOutputs
+from drivers.ur.dashboard import UrOutputs
 
 
 class Clock:

@@ -8,7 +8,7 @@ import pytest
 
 from acquisition.recording.pose_plan import read_pose_plan, write_pose_plan
 from acquisition.recording.rig import load_rig
-from acquisition.session.planned import check_planned
+from acquisition.session.session import check_planned
 from calibeam.motion.reachable_poses import candidates_of, with_grid
 from calibrate.design.design import Asked, design, enough_of
 from calibrate.design.information import information_of

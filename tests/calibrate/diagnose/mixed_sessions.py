@@ -8,7 +8,7 @@ from dataclasses import fields, replace
 import numpy as np
 
 from acquisition.recording import read
-from simulators.arm.rigid import inverse, turned
+from simulators.arm.kinematics import inverse, turned
 from simulators.conceal.case import conceal
 from simulators.conceal.case_files import columns, csv_text
 from simulators.conceal.observe import observe, postures, shaken_rad

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from acquisition.recording.rig.devices import TrackerDevice
-from calibeam.devices.tracker_of_rig import tracker_driver
+from calibeam.devices.instruments import tracker_driver
 from drivers.clock import SystemClock
 from drivers.errors import DeviceLost, DeviceRefused, DeviceStale, WireError
 from drivers.tracker.codec import LineRefusedError

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from simulators.arm.drawing import Row, as_local_poe, fixed_parts, turning_com_m
-from simulators.arm.kinematics import Arm, forward, jacobian, reach_pose, within_limits
-from simulators.arm.rigid import inverse
+from simulators.arm.kinematics import Arm, forward, inverse, jacobian, reach_pose, within_limits
 from simulators.conceal.rigs import ARM_CMM, IRB120, LARGE, UR5
 
 UR5_DH = replace(  # the maker's own table, standard notation

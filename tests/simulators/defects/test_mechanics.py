@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from simulators.arm.rigid import inverse
+from simulators.arm.kinematics import inverse
 from simulators.conceal.case import conceal
 from simulators.conceal.readings import spots, stand
 from simulators.conceal.rig import DualPsd

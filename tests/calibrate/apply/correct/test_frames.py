@@ -6,7 +6,7 @@ from scipy.spatial.transform import Rotation
 
 from calibeam.cli import run
 from calibrate.apply.correct.corrected import Arms, Options, taken_up
-from calibrate.apply.correct.frames import measured_frame
+from calibrate.apply.correct.tables import measured_frame
 from calibrate.errors import DataError
 from calibrate.model.model_file import write_model
 from tests.calibrate.apply.correct.six_joints import drawn, model, postures, real

@@ -12,7 +12,7 @@ from acquisition.recording import Samples
 from acquisition.recording.rig import parse_rig
 from calibeam.cli import run
 from calibrate.apply.export.export import export_model, form_named
-from calibrate.apply.export.mjcf import SPRING
+from calibrate.apply.export.robot_description import SPRING
 from calibrate.apply.predicting import flange_with_physics
 from calibrate.model.effect_records import Effect, EffectParameter, SessionRecord
 from calibrate.model.model_file import (

@@ -1,0 +1,336 @@
+"""Two recordings of one plan, measured and simulated: what they differ by from the outside in, and whether they agree.
+
+`compare` takes recordings to one frozen record, the content of compare.json, version 1, as in docs/formats.md.
+"""
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition.recording import Recording, Samples
+from calibrate.compare.beside_simulation import (
+    Constant,
+)
+from calibrate.compare.chain import (
+    READINGS,
+    Pair,
+    columns_of,
+    differences,
+)
+from calibrate.compare.explain import ReadingRecord, Search, explain, notes_of
+from calibrate.compare.link_differs import (
+    ROUNDING,
+    Parted,
+    judged,
+)
+from calibrate.compare.matched import (
+    Key,
+    Matched,
+    match,
+    zeros_between,
+)
+from calibrate.compare.mismatches import (
+    Level,
+    Mismatch,
+    mismatches,
+)
+from calibrate.compare.rig_and_streams import SAYS, joint_mismatches, rig_mismatches, stream_mismatches, zero_mismatches
+from calibrate.compare.rig_keys import RigKey, rig_differences
+from calibrate.compare.streams import (
+    StreamPair,
+    late_against_joints,
+    stream_pairs,
+)
+from calibrate.diagnose.doubts import Named, Verdict
+from calibrate.diagnose.record.schema import DiagnosisFile, SizeRecord
+from calibrate.diagnose.streams import devices_of
+from calibrate.errors import DataError
+from calibrate.fit.identify.identify import wrong_file
+from calibrate.model.effects.term import Size
+from calibrate.model.model_file import ModelFile
+
+Floats = NDArray[np.float64]
+READING = tuple(reading.link for reading in READINGS)
+EXPLAINED = (*READING, "encoders")  # links whose differences are asked of the model
+
+
+class NameOfCause(msgspec.Struct, frozen=True):
+    """An alternative explanation."""
+
+    where: str
+    physics: str
+
+
+class DifferenceRecord(msgspec.Struct, frozen=True):
+    """One difference, measured less simulated, the unit of each size in its name."""
+
+    level: str
+    where: str
+    physics: str
+    sizes: dict[str, SizeRecord]
+    side: str
+    decides: bool
+    p: float | None
+    says: str
+    alternatives: tuple[NameOfCause, ...]
+    simulated: dict[str, float]  # with the structure of the simulation: its own values of these parameters
+
+
+class DroppedRecord(msgspec.Struct, frozen=True):
+    """A constant that is no difference: left as in the simulation, to within these sizes, which widen the others'."""
+
+    where: str
+    physics: str
+    sizes: dict[str, SizeRecord]  # by the names of model.json
+
+
+class StreamRecord(msgspec.Struct, frozen=True):
+    """One device's stream in both recordings."""
+
+    stream: str
+    unit: str
+    status: str
+    offset_s: float | None  # simulated clock less measured clock, at `middle_s` of the measured one
+    offset_sigma_s: float | None
+    drift: float | None
+    drift_sigma: float | None
+    middle_s: float
+    samples: int
+    level: tuple[float, ...] | None
+    rms: float | None
+    noise: float | None
+    largest: float | None
+    largest_s: float | None
+    parts: bool | None
+    later_than_joints_s: float | None
+    later_than_joints_sigma_s: float | None
+
+
+class ComparisonFile(msgspec.Struct, frozen=True):
+    """Everything; `first_link` is None where nothing parts."""
+
+    schema: int
+    kind: str
+    software: str
+    measured: str
+    simulated: str
+    matched: int
+    only_measured_t_s: tuple[float, ...]
+    only_simulated_t_s: tuple[float, ...]
+    verdict: str
+    says: str
+    rig: tuple[RigKey, ...]
+    differences: tuple[DifferenceRecord, ...]
+    dropped: tuple[DroppedRecord, ...]
+    readings: tuple[ReadingRecord, ...]
+    first_link: str | None
+    links: tuple[Parted, ...]
+    streams: tuple[StreamRecord, ...]
+    notes: tuple[str, ...]
+    diagnosis: DiagnosisFile | None
+
+
+def compare(
+    measured: Recording,
+    simulated: Recording,
+    software: str,
+    *,
+    diagnosed: bool = True,
+    made_of: ModelFile | None = None,
+    structure: ModelFile | None = None,
+) -> ComparisonFile:
+    """DataError where the two are not of one arm and one plan.
+
+    `diagnosed`: explain what differs. `made_of`: the model that has predicted the simulated readings, whose own
+    uncertainty then counts as no difference. `structure`: the model whose values stand beside the differences.
+    """
+    for recording in (measured, simulated):
+        _refuse_wrong(recording)
+    rows = match(measured.samples, simulated.samples, _plans(measured, simulated))
+    pair = measured.samples.take(rows.measured), simulated.samples.take(rows.simulated)
+    zeros_rad = zeros_between(*pair)
+    pair = _without_zeros(pair, zeros_rad), pair[1]
+    asked, model, alike = explain(measured, simulated, pair, zeros_rad, made_of, diagnosed=diagnosed)
+    links = differences(model, alike)
+    parted = judged(links, model, alike)
+    rig = rig_differences(measured.rig, simulated.rig)
+    found = [*rig_mismatches(rig), *joint_mismatches(parted, links)]
+    if asked.beside is not None:
+        found += mismatches(asked.beside, zeros_rad)
+    else:
+        found += zero_mismatches(zeros_rad)
+    found += asked.left
+    streams = stream_pairs(devices_of(measured), devices_of(simulated))
+    found += stream_mismatches(measured, simulated, asked.beside, streams)
+    found.sort(key=lambda one: one.order)
+    explained = any(one.decides and one.level not in (Level.RIG, Level.STREAMS) for one in found)
+    parted = tuple(_as_explained(one, asked, explained, pair[0]) for one in parted)
+    verdict = _verdict(found, parted, asked)
+    return ComparisonFile(
+        1,
+        "calibeam-comparison",
+        software,
+        measured.path.name,
+        simulated.path.name,
+        len(rows.measured),
+        *_unmatched(measured.samples, simulated.samples, rows),
+        verdict.value,
+        _says(verdict, found, asked),
+        rig,
+        tuple(_record(one, structure) for one in found),
+        () if asked.beside is None else tuple(_dropped(one) for one in asked.beside.dropped),
+        asked.readings,
+        next((one.link for one in parted if one.parts), None),
+        parted,
+        _streams(streams),
+        tuple(notes_of(asked)),
+        asked.diagnosis,
+    )
+
+
+def _refuse_wrong(recording: Recording) -> None:
+    """DataError naming the recording whose file is written by another convention as a whole."""
+    try:
+        wrong = wrong_file(recording.rig, recording.samples)
+    except (DataError, np.linalg.LinAlgError):
+        return  # joints alone, or another arm: no reading shows which convention was meant
+    if wrong:
+        raise DataError(f"{recording.path}: {'; besides, '.join(blunder.says for blunder in wrong)}")
+
+
+def _plans(measured: Recording, simulated: Recording) -> tuple[tuple[Key, ...], tuple[Key, ...]] | None:
+    one, two = _plan(measured), _plan(simulated)
+    return None if one is None or two is None else (one, two)
+
+
+def _plan(recording: Recording) -> tuple[Key, ...] | None:
+    """Of each sample its place in the plan, as the session has written it; None where it did not."""
+    said = [event.detail.get("pose") for event in recording.events if event.kind == "sample"]
+    poses = [pose for pose in said if isinstance(pose, Mapping)]
+    if not poses or len(poses) != len(said) or len(said) != len(recording.samples):
+        return None
+    return tuple(tuple(sorted(pose.items())) for pose in poses)
+
+
+def _without_zeros(pair: Pair, zeros_rad: Floats) -> Samples:
+    """The measured table with joints that read as the simulated ones do, but for less than a servo moves."""
+    if not np.any(zeros_rad):
+        return pair[0]
+    names = [f"q{j + 1}_rad" for j in range(pair[0].n_joints)]
+    return columns_of(pair[0], {n: pair[0].column(n) - zeros_rad[j] for j, n in enumerate(names)})
+
+
+def _as_explained(one: Parted, asked: Search, explained: bool, measured: Samples) -> Parted:
+    """After a search a reading parts where it found something; noise is what it found, not what was assumed."""
+    if asked.beside is None or one.link not in EXPLAINED:
+        return one
+    if not explained:
+        return replace(one, parts=False, first_t_s=None)
+    first_t_s = float(measured.column("t_s")[0])
+    return one if one.parts else replace(one, parts=one.largest_own > ROUNDING, first_t_s=first_t_s)
+
+
+def _verdict(found: list[Mismatch], parted: tuple[Parted, ...], asked: Search) -> Verdict:
+    """No line above it may contradict it."""
+    deciding = [one for one in found if one.decides]
+    if any(one.level is not Level.UNEXPLAINED for one in deciding):
+        return Verdict.MISMATCH
+    if deciding:
+        return Verdict.UNDECIDABLE
+    if asked.beside is None and any(one.parts for one in parted):
+        return Verdict.MISMATCH
+    return Verdict.CONSISTENT if asked.why is None else Verdict.UNDECIDABLE
+
+
+def _says(verdict: Verdict, found: list[Mismatch], asked: Search) -> str:
+    deciding = [one for one in found if one.decides]
+    anew = "; what is set up again for every recording is taken into account" if len(deciding) < len(found) else ""
+    if verdict is Verdict.CONSISTENT:
+        return f"Measured and simulated agree to within the noise at every level{anew}."
+    if verdict is Verdict.UNDECIDABLE:
+        return f"{deciding[0].says if deciding else asked.why}."
+    named = [one for one in deciding if one.level is not Level.UNEXPLAINED]
+    if not named:
+        return "Measured and simulated differ; the links below show where."
+    levels = list(dict.fromkeys(one.level.value.replace("-", " ") for one in named))
+    left = " Something is left over besides." if len(named) < len(deciding) else ""
+    many = f"{len(named)} differences" if len(named) > 1 else "1 difference"
+    return f"Measured and simulated differ: {many} ({', '.join(levels)}){_how_far(asked)}.{left}"
+
+
+def _how_far(asked: Search) -> str:
+    if not asked.readings:
+        return ""
+    first = asked.readings[0]
+    says = SAYS[first.unit]
+    noise = "" if first.noise is None else f", noise {says(first.noise)}"
+    before, after = says(first.rms_coordinate_before), says(first.rms_coordinate_after)
+    return f"; {first.instrument} {before} apart before, {after} after{noise} (rms of a coordinate)"
+
+
+def _unmatched(measured: Samples, simulated: Samples, rows: Matched) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    one = measured.column("t_s")[rows.only_measured]
+    two = simulated.column("t_s")[rows.only_simulated]
+    return tuple(one.tolist()), tuple(two.tolist())
+
+
+def _dropped(one: Constant) -> DroppedRecord:
+    return DroppedRecord(one.where, one.physics, _sizes(dict(zip(one.names, one.sizes, strict=True))))
+
+
+def _sizes(sizes: Mapping[str, Size]) -> dict[str, SizeRecord]:
+    return {name: SizeRecord(_number(size.value), _number(size.sigma)) for name, size in sizes.items()}
+
+
+def _record(one: Mismatch, structure: ModelFile | None) -> DifferenceRecord:
+    others = tuple(_cause(name) for name in one.alternatives)
+    own = {} if structure is None else _own(one, structure)
+    sizes, side = _sizes(one.sizes), one.side.value
+    return DifferenceRecord(
+        one.level.value, one.where, one.physics, sizes, side, one.decides, one.p, one.says, others, own
+    )
+
+
+def _own(one: Mismatch, structure: ModelFile) -> dict[str, float]:
+    """The simulation's own values, by the model that it is made of."""
+    known = {name: structure.chain[name] for name in one.names if name in structure.chain}
+    for effect in structure.effects:
+        if (effect.where, effect.physics) == (one.where, one.physics):
+            known |= {name: p.value for name, p in effect.parameters.items() if p.value is not None}
+    return known
+
+
+def _cause(name: Named) -> NameOfCause:
+    return NameOfCause(name.where, name.physics)
+
+
+def _number(value: float) -> float | None:
+    return value if np.isfinite(value) else None
+
+
+def _streams(pairs: tuple[StreamPair, ...]) -> tuple[StreamRecord, ...]:
+    late = late_against_joints(pairs)
+    return tuple(
+        StreamRecord(
+            one.stream,
+            one.unit,
+            one.clock.status.value,
+            one.clock.offset_s,
+            one.clock.offset_sigma_s,
+            one.clock.drift,
+            one.clock.drift_sigma,
+            one.clock.middle_s,
+            one.samples,
+            one.level,
+            one.rms,
+            one.noise,
+            one.largest,
+            one.largest_s,
+            one.parts,
+            *late.get(one.stream, (None, None)),
+        )
+        for one in pairs
+    )
