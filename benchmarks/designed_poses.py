@@ -37,7 +37,7 @@ from calibrate.design.design import Asked, design
 from calibrate.design.exchange import CRITERIA
 from calibrate.design.information import Information, information_of
 from calibrate.fit.fit_plan import FitPlan
-from calibrate.model.assumed_rig import believed_arm
+from calibrate.model.assumed_rig import assumed_arm
 from drivers.clock import SystemClock
 from simulators.world.truth import Truth
 from tests.support.direct_bench import direct_bench
@@ -117,7 +117,7 @@ def _found(recording: Recording, q_rad: Floats) -> LaserBeam:
     """The laser's beam on the identified arm."""
     result = identify_session(recording, plan_without_proofs())
     values = dict(zip((p.name for p in result.parameters), result.theta.tolist(), strict=True))
-    arm = believed_arm(recording.rig, values)
+    arm = assumed_arm(recording.rig, values)
     beams = [arm.beam(q) for q in q_rad]
     return LaserBeam(np.array([origin for origin, _ in beams]), np.array([direction for _, direction in beams]))
 

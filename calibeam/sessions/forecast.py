@@ -33,7 +33,7 @@ from calibrate.fit.noise import VarianceFactors
 from calibrate.fit.rank import Identifiability, analyse
 from calibrate.fit.solvers import Status
 from calibrate.model.arms.catalogue import arm_of
-from calibrate.model.assumed_rig import BelievedRig
+from calibrate.model.assumed_rig import AssumedRig
 from calibrate.model.observations import SIGMA_COLUMNS
 from calibrate.model.parameters import index_of, priors, start_values
 
@@ -56,7 +56,7 @@ class Ahead:
 
 def ahead_of_blocks(rig: Rig, blocks: Sequence[Block]) -> Ahead:
     """Of a session that aims; repeats stand where their first pose stands."""
-    believed, rng = BelievedRig(rig), np.random.default_rng(SEED)
+    believed, rng = AssumedRig(rig), np.random.default_rng(SEED)
     near_rad = np.array(rig.motion.home_rad)
     found: dict[PoseKey, tuple[Floats, Floats]] = {}
     for block in blocks:
@@ -75,7 +75,7 @@ def ahead_of_blocks(rig: Rig, blocks: Sequence[Block]) -> Ahead:
 
 def ahead_of_plan(rig: Rig, plan: PosePlan) -> Ahead:
     """Of a plan of joint poses."""
-    believed = BelievedRig(rig)
+    believed = AssumedRig(rig)
     each = [(block, pose) for block in plan.block for pose in block.pose]
     keys = tuple(PoseKey(block.placement or 0, block.first_psd or 1, k) for k, (block, _) in enumerate(each))
     found: list[tuple[Floats, Floats]] = []

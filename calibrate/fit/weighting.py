@@ -29,7 +29,7 @@ from calibrate.fit.noise.variance import (
     FIXED,
     NoisyRows,
     VarianceFactors,
-    as_believed,
+    as_assumed,
     covariance_of,
 )
 from calibrate.model.parameters import Parameter, priors, start_values
@@ -71,7 +71,7 @@ class Weighting:
     @property
     def believed(self) -> VarianceFactors:
         """Every source as large as assumed."""
-        return as_believed(len(self.sources))
+        return as_assumed(len(self.sources))
 
     def problem(self, theta: Floats, factors: VarianceFactors | None = None) -> JointProblem:
         """The joint problem with weights from the noise at `theta` (param,), as assumed without `factors`."""

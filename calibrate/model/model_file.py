@@ -253,7 +253,7 @@ def _other(content: dict[str, Any]) -> str | None:
 
 
 def corrections(model: ModelFile) -> dict[str, float]:
-    """The complete set of values for predictions, by parameter name: what `believed.BelievedRig` takes."""
+    """The complete set of values for predictions, by parameter name: what `AssumedRig` takes."""
     return dict(model.chain)
 
 

@@ -33,7 +33,7 @@ from calibrate.fit.identify.fit_report import sizes_of_noise
 from calibrate.fit.identify.record import left_out, noise_fields
 from calibrate.fit.identify.result import POSE, POSITION, alarms_of
 from calibrate.fit.identify.session import NEGLIGIBLE_RAD, about_of, joints_apart
-from calibrate.fit.noise import TOLD, VarianceFactors
+from calibrate.fit.noise import SEPARABLE, VarianceFactors
 from calibrate.fit.rank import Identifiability, analyse
 from calibrate.fit.solvers import Status, Stop
 from calibrate.fit.weighting import JOINT, Weighting
@@ -446,7 +446,7 @@ def _factors(parts: list[Floats], covariances: list[Floats], *, settled: bool) -
         if np.allclose(factor, before, rtol=SAME_VARIANCE):
             break
         last = [np.einsum("s,snij->nij", factor, part) for part in parts]
-    at_zero = (factor < TOLD * sigma) & (factor < 1.0)
+    at_zero = (factor < SEPARABLE * sigma) & (factor < 1.0)
     log_sigma = sigma / np.maximum(factor, sigma)
     return VarianceFactors(np.log(factor), np.diag(log_sigma**2), settled, tuple(at_zero.tolist()))
 

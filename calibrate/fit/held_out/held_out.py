@@ -83,11 +83,11 @@ def bootstrap(
     found: list[Floats] = []
     for _ in range(rounds):
         rows = np.concatenate([*(members[i] for i in rng.integers(len(members), size=len(members))), stated])
-        believed = tuple(
+        redrawn = tuple(
             replace(p, start=p.start + rng.normal(0.0, p.prior)) if p.free and np.isfinite(p.prior) else p
             for p in problem.parameters
         )
-        again = by.fit(problem.select(rows).with_parameters(believed), fit.theta)
+        again = by.fit(problem.select(rows).with_parameters(redrawn), fit.theta)
         if again.status is Status.CONVERGED:
             found.append(again.theta)
     return Bootstrap(np.array(found).reshape(-1, len(fit.theta)), rounds - len(found))

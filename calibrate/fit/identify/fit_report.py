@@ -45,7 +45,7 @@ from calibrate.fit.rank.observability import analyse_along, points_along
 from calibrate.fit.solvers import FAR_START, Fit, Status
 from calibrate.fit.solvers.least_squares import triangle_of
 from calibrate.fit.weighting import JOINT, Weighting
-from calibrate.model.checks.gross_error import Blunder
+from calibrate.model.checks.gross_error import GrossError
 from calibrate.model.parameters import (
     Parameter,
     hold,
@@ -68,7 +68,7 @@ FAR = 3.0  # plausible sizes that the truth of an unseen combination may lie fro
 
 
 def result_of(
-    fitted: Fitted, blunders: tuple[Blunder, ...], rig: Rig, samples: Samples, *, asked: Asked, rng: Generator
+    fitted: Fitted, blunders: tuple[GrossError, ...], rig: Rig, samples: Samples, *, asked: Asked, rng: Generator
 ) -> Identification:
     """Everything that travels with the values; `samples` are the whole file, of which the fit took some rows."""
     fit, before = fitted.fit, fit_places_only(fitted)
@@ -156,19 +156,19 @@ def _widening(fitted: Fitted) -> Floats:
 
 def sizes_of_noise(weighting: Weighting, factors: VarianceFactors) -> tuple[Noise, ...]:
     """Every source of noise that was asked for its size: one sigma in m or rad, as assumed and as `factors` have it."""
-    believed = {
+    assumed = {
         source: float(np.median(sigma[sigma > 0.0]))
         for m in reversed(weighting.measured)
         for source, sigma in m.own_sigma.items()
     }
     if weighting.joint_rad > NEGLIGIBLE_RAD:
-        believed[JOINT] = weighting.joint_rad
+        assumed[JOINT] = weighting.joint_rad
     found = {
-        name: Noise(name, believed[name], believed[name] * float(f), believed[name] * float(s), at_zero)
+        name: Noise(name, assumed[name], assumed[name] * float(f), assumed[name] * float(s), at_zero)
         for name, f, s, at_zero in zip(
             weighting.sources, factors.factor, factors.factor_sigma, factors.at_zero, strict=True
         )
-        if name in believed
+        if name in assumed
     }
     if JOINT in found:
         found[JOINT] = _with_shared(found[JOINT], *weighting.shared_rad(factors))

@@ -13,7 +13,7 @@ from calibrate.fit.identify.estimates import Estimate
 from calibrate.fit.identify.result import Evidence, FitEnd, FreeSpace, Identification, Noise
 from calibrate.fit.rank.identifiability import Identifiability
 from calibrate.fit.rank.observability import Observability
-from calibrate.model.checks.gross_error import Blunder
+from calibrate.model.checks.gross_error import GrossError
 from calibrate.model.model_file import (
     WITH_PHYSICS,
     BootstrapRecord,
@@ -208,6 +208,6 @@ def _plain(fields: Fields) -> Fields:
     return {k: getattr(v, "name", v) for k, v in fields.items()}
 
 
-def left_out(blunder: Blunder) -> LeftOut:
+def left_out(blunder: GrossError) -> LeftOut:
     """With rows counted from 1, as a person counts."""
     return LeftOut(blunder.kind.name, tuple(row + 1 for row in blunder.rows), blunder.column, blunder.says)

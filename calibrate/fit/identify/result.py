@@ -22,7 +22,7 @@ from calibrate.fit.solvers import (
     Status,
     Stop,
 )
-from calibrate.model.checks.gross_error import Blunder
+from calibrate.model.checks.gross_error import GrossError
 from calibrate.model.parameters import Parameter
 from calibrate.model.sensors.catalogue import kind_of, names_with
 from calibrate.model.sensors.kind import Trait
@@ -130,7 +130,7 @@ class Identification:
     """Outcome of the identification of an arm by any instruments."""
 
     status: Status
-    blunders: tuple[Blunder, ...]  # their rows took no part
+    blunders: tuple[GrossError, ...]  # their rows took no part
     estimates: tuple[Estimate, ...]  # of all parameters, in order
     identifiability: Identifiability
     instruments: tuple[InstrumentFound, ...]

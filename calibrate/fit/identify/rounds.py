@@ -84,9 +84,9 @@ def coarse_start(weighting: Weighting, start: Floats) -> Floats:
     has a prior, or where the fit is not finite.
     """
     problem = weighting.problem(start)
-    believed = {p.name for p in problem.parameters if p.free and np.isfinite(p.prior)}
-    rest = problem.with_parameters(hold(problem.parameters, believed))
-    if not believed or not any(p.free for p in rest.parameters):
+    with_prior = {p.name for p in problem.parameters if p.free and np.isfinite(p.prior)}
+    rest = problem.with_parameters(hold(problem.parameters, with_prior))
+    if not with_prior or not any(p.free for p in rest.parameters):
         return start
     seen = analyse(rest.fulfilled(start).jacobian(start), rest.parameters)
     fit = solve(rest.with_parameters(reduced(rest.parameters, seen)), start=start, tolerance=COARSE)

@@ -71,7 +71,7 @@ def _fit(rows: Rows, ended: Ended, loss: Loss, tolerance: float, *, covariance: 
     parameters, theta = rows.problem.parameters, ended.theta
     robust = loss.kind is not LossKind.SQUARE
     plain = rows.residual(theta) if robust else ended.residual
-    data, beliefs = plain[: len(plain) - len(rows.believed)], plain[len(plain) - len(rows.believed) :]
+    data, prior_rows = plain[: len(plain) - len(rows.with_prior)], plain[len(plain) - len(rows.with_prior) :]
     chi2 = float(plain @ plain)
     scaled = None
     if covariance and ended.slope is not None:
@@ -87,7 +87,7 @@ def _fit(rows: Rows, ended: Ended, loss: Loss, tolerance: float, *, covariance: 
         ended.steps,
         at_bound if ended.slope is not None else (),
         ended.stop,
-        float(total_cost(rows.problem, data, loss) + beliefs @ beliefs) if robust else chi2,
+        float(total_cost(rows.problem, data, loss) + prior_rows @ prior_rows) if robust else chi2,
         row_weights(rows.problem, data, loss) if robust else None,
     )
 

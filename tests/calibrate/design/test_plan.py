@@ -63,9 +63,9 @@ def test_the_plan_promises_less_error_than_random_poses(made):
 
 
 def test_expected_spots_are_those_of_the_rig_as_drawn(rig, candidates, made):
-    from calibrate.model.assumed_rig import BelievedRig
+    from calibrate.model.assumed_rig import AssumedRig
 
-    believed = BelievedRig(rig)
+    believed = AssumedRig(rig)
     for block in made.plan.block:
         for pose in block.pose:
             spots = believed.spots(np.array(pose.q_rad), block.placement, block.first_psd)
@@ -74,9 +74,9 @@ def test_expected_spots_are_those_of_the_rig_as_drawn(rig, candidates, made):
 
 def test_candidates_are_within_limits_above_the_table_and_lit(rig, candidates):
     from acquisition.centring.aim import clear_of_table
-    from calibrate.model.assumed_rig import BelievedRig, Light
+    from calibrate.model.assumed_rig import AssumedRig, Light
 
-    believed = BelievedRig(rig)
+    believed = AssumedRig(rig)
     for q, place, first in zip(candidates.q_rad, candidates.placement, candidates.first_psd, strict=True):
         assert believed.expect(q, int(place), int(first)).light is Light.BOTH_LIT
         assert clear_of_table(believed.arm, q)
