@@ -27,7 +27,7 @@ from acquisition.session.plan import Block, PoseKey
 from acquisition.session.records import Sample
 from calibrate.design import Candidates, Information, target_of, with_prior
 from calibrate.fit.accuracy import FELT_M
-from calibrate.fit.identify.rounds import Fitted, coarse_start, settled_fit
+from calibrate.fit.identify.rounds import SettledFit, coarse_start, settled_fit
 from calibrate.fit.identify.session import instruments_for_fit
 from calibrate.fit.noise import VarianceFactors
 from calibrate.fit.rank import Identifiability, analyse
@@ -139,7 +139,7 @@ def forecast(rig: Rig, taken: list[Sample], ahead: Candidates, goal_m: float) ->
         return replace(nothing, why="these poses are too few, or too alike")
 
 
-def _told(rig: Rig, rows: Samples, fitted: Fitted, nothing: Forecast) -> Forecast:
+def _told(rig: Rig, rows: Samples, fitted: SettledFit, nothing: Forecast) -> Forecast:
     """The numbers, or why there is none."""
     names = {p.name: float(v) for p, v in zip(fitted.fit.parameters, fitted.fit.theta, strict=True)}
     found, seen, felt_m = _information(rig, rows, names, fitted.factors, nothing.samples)
@@ -194,7 +194,7 @@ def _falling(found: Information, taken: int) -> Floats:
     return np.array(out)
 
 
-def _fitted(rig: Rig, samples: Samples) -> Fitted:
+def _fitted(rig: Rig, samples: Samples) -> SettledFit:
     instruments = instruments_for_fit(rig, samples)
     return settled_fit(instruments.weighting, coarse_start(instruments.weighting, instruments.start))
 

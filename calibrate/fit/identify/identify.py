@@ -22,7 +22,7 @@ from calibrate.fit.gross_errors.bad_rows import duplicated_rows, left_alone, row
 from calibrate.fit.gross_errors.conventions import wrong_convention, wrong_table
 from calibrate.fit.gross_errors.joint_hypotheses import as_radians, beyond_limits
 from calibrate.fit.identify.clean import clean, mirrored_axes, refuse_most, rows_of
-from calibrate.fit.identify.evidence import Asked, Splitting
+from calibrate.fit.identify.evidence import EvidenceOptions, Splitting
 from calibrate.fit.identify.fit_report import result_of
 from calibrate.fit.identify.point_constraint import point_constraints
 from calibrate.fit.identify.result import Identification
@@ -65,7 +65,7 @@ def identify(
     fitted = settled_fit(weighting, coarse_start(weighting, start), plan.of_redundant, by)
     share = plan.share if held_out_share is None else held_out_share
     rounds = plan.bootstrap if bootstrap_rounds is None else bootstrap_rounds
-    asked = Asked(Splitting(share, plan.splits), rounds)
+    asked = EvidenceOptions(Splitting(share, plan.splits), rounds)
     result = result_of(fitted, blunders, rig, samples, asked=asked, rng=rng)
     if plan.method is not BesideName.POINT_CONSTRAINT:
         return result

@@ -38,7 +38,7 @@ LEAST_SCALE = 1e-6  # of the assumed noise: perfect data have a scale, too
 
 
 @dataclass(frozen=True)
-class Fitted:
+class SettledFit:
     """A fit under its weights; `seen` at its end, before anything redundant was held."""
 
     weighting: Weighting
@@ -52,7 +52,7 @@ class Fitted:
 
 def settled_fit(
     weighting: Weighting, start: Floats, redundant: Redundant = Redundant.REMOVED, by: Estimator = LEAST_SQUARES
-) -> Fitted:
+) -> SettledFit:
     """Rounds from `start` (param,) until weights and rank stand."""
     fitted = _round(weighting, weighting.believed, start, FAR_START, redundant, by)
     steps = fitted.fit.steps
@@ -120,10 +120,10 @@ def _round(
     damping: float,
     redundant: Redundant,
     by: Estimator = LEAST_SQUARES,
-) -> Fitted:
+) -> SettledFit:
     problem = weighting.problem(start, factors)
     fit, seen = _solved(problem, start, damping, redundant, by)
-    return Fitted(weighting, problem, fit, seen, factors, fit.steps, by)
+    return SettledFit(weighting, problem, fit, seen, factors, fit.steps, by)
 
 
 def _solved(

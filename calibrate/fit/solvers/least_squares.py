@@ -151,7 +151,7 @@ class Fit:
 
 
 @dataclass(frozen=True)
-class Rows:
+class WeightedRows:
     """LeastSquares with its priors as rows; parameters enter by their free ones only, in units of `scale`."""
 
     problem: LeastSquares
@@ -165,7 +165,7 @@ class Rows:
     root_weight: Floats | None = None  # (row,) on the data rows; None: all 1
 
     @classmethod
-    def of(cls, problem: LeastSquares) -> "Rows":
+    def of(cls, problem: LeastSquares) -> "WeightedRows":
         parameters = problem.parameters
         free = np.flatnonzero([p.free for p in parameters])
         prior, centre = priors(parameters)[free], start_values(parameters)[free]
@@ -181,7 +181,7 @@ class Rows:
             np.array([p.upper for p in parameters])[free],
         )
 
-    def weighted(self, weights: Floats) -> "Rows":
+    def weighted(self, weights: Floats) -> "WeightedRows":
         """The same with weights (row,) on the squares of the data rows."""
         return replace(self, root_weight=np.sqrt(weights))
 
@@ -231,7 +231,7 @@ class Rows:
 
 @dataclass(frozen=True)
 class Ended:
-    """Where an algorithm came to rest; residual and slope are those of `Rows` at `theta`."""
+    """Where an algorithm came to rest; residual and slope are those of `WeightedRows` at `theta`."""
 
     theta: Floats
     residual: Floats
