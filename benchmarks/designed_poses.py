@@ -33,11 +33,11 @@ from calibrate.design.candidates import (
     plan_of,
     taken,
 )
-from calibrate.design.design import Asked, design
+from calibrate.design.design import DesignOptions, design
 from calibrate.design.exchange import CRITERIA
 from calibrate.design.information import Information, information_of
 from calibrate.fit.fit_plan import FitPlan
-from calibrate.model.assumed_rig import believed_arm
+from calibrate.model.assumed_rig import assumed_arm
 from drivers.clock import SystemClock
 from simulators.world.truth import Truth
 from tests.support.direct_bench import direct_bench
@@ -64,7 +64,7 @@ def run(rig_file: Path, seeds: range, criterion: str = "free-space") -> Iterator
     rig, rng = load_rig(rig_file), np.random.default_rng(1)
     candidates = candidates_of(rig, 120, rng)
     found = information_of(rig, candidates, rng)
-    designed = design(rig, candidates, found, Asked(poses=POSES, criterion=criterion)).plan
+    designed = design(rig, candidates, found, DesignOptions(poses=POSES, criterion=criterion)).plan
     for seed in seeds:
         random = _random(rig, candidates, seed)
         (a, taken_a), (b, taken_b) = (_error_m(rig_file, rig, plan, seed) for plan in (designed, random))
@@ -79,7 +79,7 @@ def predicted(rig_file: Path) -> Iterator[str]:
     drawn = [_promised(found, rng.choice(len(candidates), POSES, replace=False)) for _ in range(20)]
     yield f"predicted error in free space, {POSES} poses: random {1e6 * float(np.median(drawn)):.1f} um (median of 20)"
     for name in CRITERIA:
-        made = design(rig, candidates, found, Asked(poses=POSES, criterion=name))
+        made = design(rig, candidates, found, DesignOptions(poses=POSES, criterion=name))
         yield f"  {name:10s} {1e6 * made.free_space_m:.1f} um"
 
 
@@ -117,7 +117,7 @@ def _found(recording: Recording, q_rad: Floats) -> LaserBeam:
     """The laser's beam on the identified arm."""
     result = identify_session(recording, plan_without_proofs())
     values = dict(zip((p.name for p in result.parameters), result.theta.tolist(), strict=True))
-    arm = believed_arm(recording.rig, values)
+    arm = assumed_arm(recording.rig, values)
     beams = [arm.beam(q) for q in q_rad]
     return LaserBeam(np.array([origin for origin, _ in beams]), np.array([direction for _, direction in beams]))
 

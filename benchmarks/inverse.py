@@ -11,7 +11,7 @@ from acquisition.recording.rig import load_rig
 from benchmarks.many_poses import solve_many
 from calibrate.model.arms.catalogue import dh_rows
 from calibrate.model.arms.dh import DhArm, DhLink
-from calibrate.model.arms.link_tolerance import HELD_AS_DRAWN
+from calibrate.model.arms.link_tolerance import HELD_NOMINAL
 from calibrate.model.arms.rig_arm import RigArm
 
 POSES = 10_000
@@ -46,7 +46,7 @@ def lines(rig: Path) -> Iterator[str]:
 
 
 def _measured(rows: tuple[DhLink, ...], lower: np.ndarray, upper: np.ndarray, off: float) -> str:
-    model, rng = DhArm(rows, HELD_AS_DRAWN), np.random.default_rng(1)
+    model, rng = DhArm(rows, HELD_NOMINAL), np.random.default_rng(1)
     nominal = RigArm.of(model, np.zeros(len(model.parameters)), lower, upper)
     arm = RigArm.of(model, off * rng.normal(size=len(model.parameters)), lower, upper)
     T = arm.frames(rng.uniform(lower, upper, (POSES, 6)))[:, -1]

@@ -12,7 +12,7 @@ from acquisition.centring.aim import BeamTarget, flange_for, reach
 from acquisition.recording.rig import Rig
 from acquisition.wires.psd_view import PsdView
 from calibeam.live.feed import Feed
-from calibrate.model.assumed_rig import BelievedRig
+from calibrate.model.assumed_rig import AssumedRig
 from drivers.clock import Clock
 from drivers.device import Block
 from drivers.psd_daq.messages import Flag
@@ -30,7 +30,7 @@ WANDER_HZ = np.array([0.11, 0.17, 0.13, 0.19, 0.23, 0.07])
 
 def lit_posture(rig: Rig, placement: int = 1, first: int = 1) -> Floats:
     """Joint readings whose beam strikes the middle of both faces."""
-    believed = BelievedRig(rig)
+    believed = AssumedRig(rig)
     middle = BeamTarget(first, (0.0, 0.0, 0.0, 0.0), BEFORE_M, 0.0)
     flange = flange_for(believed.arm, believed.fixture, believed.T_base_psd1(placement), middle)
     return reach(believed.arm, flange, np.array(rig.motion.home_rad), np.random.default_rng(1))
@@ -52,7 +52,7 @@ class LivingRig:
     def __post_init__(self) -> None:
         assert self.rig.fixture is not None
         self._half_m = self.rig.fixture.half_size_m
-        self._believed = BelievedRig(self.rig)
+        self._believed = AssumedRig(self.rig)
         self._middle_rad = lit_posture(self.rig, self.placement)
         self._next = dict.fromkeys(RATES_HZ, 0)
         self._rng = np.random.default_rng(2)

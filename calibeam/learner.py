@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from acquisition.recording.rig import Rig
 from acquisition.session.records import Sample
 from calibrate.fit.solvers import solve
-from calibrate.model.assumed_rig import BelievedArm, BelievedFixture, BelievedRig
+from calibrate.model.assumed_rig import AssumedArm, AssumedFixture, AssumedRig
 from calibrate.model.dual_psd_rig import dual_psd_chain
 from calibrate.model.parameters import Parameter
 from calibrate.model.problem import Problem
@@ -49,14 +49,14 @@ class FittedLearner:
     def __init__(self, rig: Rig, beliefs: Beliefs | None = None) -> None:
         self._rig, self._beliefs = rig, beliefs or Beliefs()
         self._corrections: dict[str, float] = {}
-        self._believed = BelievedRig(rig)
+        self._believed = AssumedRig(rig)
 
     @property
-    def arm(self) -> BelievedArm:
+    def arm(self) -> AssumedArm:
         return self._believed.arm
 
     @property
-    def optics(self) -> BelievedFixture:
+    def optics(self) -> AssumedFixture:
         return self._believed.fixture
 
     def T_base_fixture(self, placement: int) -> Floats:
@@ -74,7 +74,7 @@ class FittedLearner:
         start = np.array([self._corrections.get(p.name, p.start) for p in parameters])
         fit = solve(problem, start=start, max_steps=30)
         self._corrections = {p.name: float(v) for p, v in zip(parameters, fit.theta, strict=True)}
-        self._believed = BelievedRig(self._rig, self._corrections)
+        self._believed = AssumedRig(self._rig, self._corrections)
 
     def _believed_to(self, parameter: Parameter) -> Parameter:
         sigma = self._beliefs.of(parameter)

@@ -79,7 +79,7 @@ def design_command(
     """
     from calibeam.motion.reachable_poses import candidates_of
     from calibeam.printing.design import print_design
-    from calibrate.design import Asked, design, information_of, record_of, seen_by
+    from calibrate.design import DesignOptions, design, information_of, record_of, seen_by
 
     loaded, rng, console = load_rig(rig), np.random.default_rng(seed), Console()
     with progress_bar(Console(stderr=True)) as bar:
@@ -92,7 +92,7 @@ def design_command(
 
         offered = candidates_of(loaded, candidates, rng, lambda done, total: progress("candidates", done, total))
         found = information_of(loaded, offered, rng)
-        made = design(loaded, offered, found, Asked(poses, repeats, criterion, seed), progress)
+        made = design(loaded, offered, found, DesignOptions(poses, repeats, criterion, seed), progress)
         write_pose_plan(out, made.plan)  # before anything else can go wrong
         seen = seen_by(loaded, offered, made.taken, rng)
         spread = _places(loaded, poses, places, rng, progress) if places else ()

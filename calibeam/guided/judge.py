@@ -28,7 +28,7 @@ from calibrate.model.chain import (
     KinematicModel,
 )
 from calibrate.model.default_tolerance import SCALELESS
-from calibrate.model.dual_psd_rig import believed_noise
+from calibrate.model.dual_psd_rig import assumed_noise
 from calibrate.model.parameters import Parameter, priors, values_by_name
 from calibrate.model.rigid import cross_matrix
 from calibrate.model.sensors import seat
@@ -149,7 +149,7 @@ class FittedJudge:
         self._rig = msgspec.structs.replace(rig, tolerance=stated)
         self._arm: KinematicModel = with_discs(arm_of(self._rig), self._rig)
         self._point_m = np.array(rig.tool.point_m or (0.0, 0.0, 0.0))
-        self._noise = believed_noise(rig).joint_rad, rig.noise.seat_m or SEAT_BELIEVED_M
+        self._noise = assumed_noise(rig).joint_rad, rig.noise.seat_m or SEAT_BELIEVED_M
         sigmas = np.array([assumed_prior(p).prior if p.free else 0.0 for p in self._arm.parameters])
         self._values: Mapping[str, float] = {}
         self._theta, self._covariance = np.zeros(len(sigmas)), np.diag(sigmas**2)

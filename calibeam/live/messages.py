@@ -18,7 +18,7 @@ from acquisition.wires.psd_view import NO_LIGHT, SATURATED, PsdView
 from calibeam.live.feed import Progress
 from calibeam.live.health import Health
 from calibrate.model.arms.rig_arm import RigArm
-from calibrate.model.assumed_rig import BelievedRig, Light
+from calibrate.model.assumed_rig import AssumedRig, Light
 from calibrate.model.dual_psd_rig import dual_psd_chain
 from drivers.device import Block
 
@@ -98,7 +98,7 @@ class Scene:
         found = self._nearest(self._believed, T_base_flange, spots_m)
         return None if found is None else SceneFixture(*found, self._corners(found[0]), told=False)
 
-    def _nearest(self, believed: BelievedRig, T_base_flange: Floats, spots_m: Floats) -> tuple[int, int] | None:
+    def _nearest(self, believed: AssumedRig, T_base_flange: Floats, spots_m: Floats) -> tuple[int, int] | None:
         off_m: dict[tuple[int, int], float] = {}
         for placement in self._faces:
             for first in (1, 2):
@@ -116,12 +116,12 @@ class Scene:
     def _rebuild(self) -> None:
         rig, tool, fixture = self._rig, self._rig.tool, self._rig.fixture
         self._arm = RigArm.of_rig(rig, self._corrections)
-        self._believed: BelievedRig | None = None
+        self._believed: AssumedRig | None = None
         self._faces: dict[int, tuple[Points, Points]] = {}  # by placement: T_base_face of PSD 1, PSD 2, as lists
         self._half_size_m = 0.0 if fixture is None else fixture.half_size_m
         if tool.laser_origin_m is None or tool.laser_direction is None or fixture is None or not rig.placements:
             return
-        believed = self._believed = BelievedRig(rig, self._known())
+        believed = self._believed = AssumedRig(rig, self._known())
         places = {placement: believed.T_base_psd1(placement) for placement in believed.placements}
         self._faces = {k: (T.tolist(), (T @ believed.T_psd1_psd2).tolist()) for k, T in places.items()}
 

@@ -23,7 +23,7 @@ from calibeam.motion.gate_of_rig import cell_of, solver_of
 from calibrate.design import Candidates
 from calibrate.errors import DataError
 from calibrate.model.arms.convert import pose_of
-from calibrate.model.assumed_rig import BelievedRig, Light
+from calibrate.model.assumed_rig import AssumedRig, Light
 from calibrate.model.rigid import transform
 
 HEIGHTS_M = (-0.05, 0.0, 0.15)  # beside that of the rig's first place
@@ -89,7 +89,7 @@ def candidates_of(
 
 
 def _before_detectors(rig: Rig, per_block: int, rng: Generator, progress: Progress) -> Candidates:
-    believed, blocks = BelievedRig(rig), [(place, first) for place in rig.placements for first in (1, 2)]
+    believed, blocks = AssumedRig(rig), [(place, first) for place in rig.placements for first in (1, 2)]
     q, spots, place_of, first_of = list[Floats](), list[Floats](), list[int](), list[int]()
     for done, (place, first) in enumerate(blocks):
         for pose, seen in _landed(rig, believed, place, first, per_block, rng):
@@ -104,7 +104,7 @@ def _before_detectors(rig: Rig, per_block: int, rng: Generator, progress: Progre
 
 
 def _landed(
-    rig: Rig, believed: BelievedRig, place: int, first: int, wanted: int, rng: Generator
+    rig: Rig, believed: AssumedRig, place: int, first: int, wanted: int, rng: Generator
 ) -> list[tuple[Floats, Floats]]:
     options, solver, half_m = PlanOptions(), solver_of(rig), believed.fixture.half_size_m
     home, T = np.array(rig.motion.home_rad or np.zeros(rig.n_joints)), believed.T_base_psd1(place)

@@ -17,12 +17,12 @@ from calibrate.fit.identify.record import parameter_records
 from calibrate.fit.identify.result import (
     Evidence,
     FreeSpace,
+    HeldOutError,
     Identification,
-    Unseen,
 )
 from calibrate.fit.rank import Observability
 from calibrate.model.default_tolerance import said_of
-from calibrate.model.effect_records import Effect
+from calibrate.model.effect_records import EffectRecord
 from calibrate.model.effects.term import Size, decimals_of, plain
 from calibrate.model.model_file import ModelFile, ModelParameter
 from calibrate.model.sensors import spots
@@ -38,7 +38,7 @@ from calibrate.report.elements.verdict import (
     Answers,
     Number,
     Trust,
-    Verdict,
+    VerdictBox,
 )
 from calibrate.report.evidence import SessionEvidence, fit_end, session_verdict
 from calibrate.report.workspace import session_room, tool_numbers
@@ -46,7 +46,7 @@ from calibrate.report.workspace import session_room, tool_numbers
 COLOUR = {Trust.GOOD: "green", Trust.CARE: "yellow", Trust.NONE: "red"}
 
 
-def print_verdict(console: Console, judged: Verdict) -> None:
+def print_verdict(console: Console, judged: VerdictBox) -> None:
     """How far to trust what was found, and every reason for care."""
     console.print(judged.sentence, style=f"bold {COLOUR[judged.trust]}", highlight=False, markup=False)
     console.print(f"trust: {judged.trust.value}", highlight=False, markup=False)
@@ -92,7 +92,7 @@ def evidence_lines(evidence: Evidence) -> list[str]:
     return out
 
 
-def _held_out(unseen: Unseen) -> str:
+def _held_out(unseen: HeldOutError) -> str:
     return (
         f"held out ({unseen.split}): {unseen.name}, {unseen.observations} rows, "
         f"{1e3 * unseen.rms_distance_before_m:.4g} {thousandth_of(unseen.name)} rms distance before, "
@@ -355,7 +355,7 @@ def refitted_lines(model: ModelFile) -> Iterator[str]:
             yield f"{effect.name}: {', '.join(_sizes(effect)) or 'not determined by these samples'}"
 
 
-def _sizes(effect: Effect) -> Iterator[str]:
+def _sizes(effect: EffectRecord) -> Iterator[str]:
     for name, size in effect.parameters.items():
         if size.value is not None and size.sigma is not None:
             yield f"{name}: {plain(name, Size(size.value, size.sigma))}"

@@ -33,7 +33,7 @@ from calibrate.fit.identify.result import Identification
 from calibrate.fit.solvers import Status
 from calibrate.model.model_file import ModelFile, RigIdentity, write_model
 from calibrate.model.predict import rig_in_model
-from calibrate.report.elements.verdict import Verdict
+from calibrate.report.elements.verdict import VerdictBox
 from calibrate.report.evidence import session_evidence, session_verdict
 
 UNFINISHED = (Status.OUT_OF_STEPS, Status.STALLED, Status.AT_BOUND)
@@ -140,7 +140,7 @@ class JudgedModel:
     """What model.json would hold, how far to trust it, and what it leaves of each reading."""
 
     model: ModelFile
-    verdict: Verdict
+    verdict: VerdictBox
     errors: tuple[ReadingErrors, ...]
 
     @property

@@ -27,13 +27,13 @@ from acquisition.session.plan import Block, PoseKey
 from acquisition.session.records import Sample
 from calibrate.design import Candidates, Information, target_of, with_prior
 from calibrate.fit.accuracy import FELT_M
-from calibrate.fit.identify.rounds import Fitted, coarse_start, settled_fit
+from calibrate.fit.identify.rounds import SettledFit, coarse_start, settled_fit
 from calibrate.fit.identify.session import instruments_for_fit
 from calibrate.fit.noise import VarianceFactors
 from calibrate.fit.rank import Identifiability, analyse
 from calibrate.fit.solvers import Status
 from calibrate.model.arms.catalogue import arm_of
-from calibrate.model.assumed_rig import BelievedRig
+from calibrate.model.assumed_rig import AssumedRig
 from calibrate.model.observations import SIGMA_COLUMNS
 from calibrate.model.parameters import index_of, priors, start_values
 
@@ -56,7 +56,7 @@ class Ahead:
 
 def ahead_of_blocks(rig: Rig, blocks: Sequence[Block]) -> Ahead:
     """Of a session that aims; repeats stand where their first pose stands."""
-    believed, rng = BelievedRig(rig), np.random.default_rng(SEED)
+    believed, rng = AssumedRig(rig), np.random.default_rng(SEED)
     near_rad = np.array(rig.motion.home_rad)
     found: dict[PoseKey, tuple[Floats, Floats]] = {}
     for block in blocks:
@@ -75,7 +75,7 @@ def ahead_of_blocks(rig: Rig, blocks: Sequence[Block]) -> Ahead:
 
 def ahead_of_plan(rig: Rig, plan: PosePlan) -> Ahead:
     """Of a plan of joint poses."""
-    believed = BelievedRig(rig)
+    believed = AssumedRig(rig)
     each = [(block, pose) for block in plan.block for pose in block.pose]
     keys = tuple(PoseKey(block.placement or 0, block.first_psd or 1, k) for k, (block, _) in enumerate(each))
     found: list[tuple[Floats, Floats]] = []
@@ -139,7 +139,7 @@ def forecast(rig: Rig, taken: list[Sample], ahead: Candidates, goal_m: float) ->
         return replace(nothing, why="these poses are too few, or too alike")
 
 
-def _told(rig: Rig, rows: Samples, fitted: Fitted, nothing: Forecast) -> Forecast:
+def _told(rig: Rig, rows: Samples, fitted: SettledFit, nothing: Forecast) -> Forecast:
     """The numbers, or why there is none."""
     names = {p.name: float(v) for p, v in zip(fitted.fit.parameters, fitted.fit.theta, strict=True)}
     found, seen, felt_m = _information(rig, rows, names, fitted.factors, nothing.samples)
@@ -194,7 +194,7 @@ def _falling(found: Information, taken: int) -> Floats:
     return np.array(out)
 
 
-def _fitted(rig: Rig, samples: Samples) -> Fitted:
+def _fitted(rig: Rig, samples: Samples) -> SettledFit:
     instruments = instruments_for_fit(rig, samples)
     return settled_fit(instruments.weighting, coarse_start(instruments.weighting, instruments.start))
 

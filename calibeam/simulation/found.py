@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from calibeam.simulation.rig_in_numbers import arm_in_numbers, beyond_m, light_of
 from calibrate.errors import DataError
-from calibrate.model.effect_records import Effect
+from calibrate.model.effect_records import EffectRecord
 from calibrate.model.effects.curve import cause
 from calibrate.model.effects.drivers import Drivers
 from calibrate.model.effects.gravity import likely_torque_nm
@@ -99,7 +99,7 @@ class FoundEffect:
     session: FoundIn
 
     @classmethod
-    def of(cls, effect: Effect, accepted: Accepted, session: FoundIn) -> "FoundEffect":
+    def of(cls, effect: EffectRecord, accepted: Accepted, session: FoundIn) -> "FoundEffect":
         """As model.json holds it."""
         return cls(effect.name, accepted.term, accepted.coefficients, accepted.inner, session)
 

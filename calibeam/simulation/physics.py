@@ -9,7 +9,7 @@ from calibeam.simulation.found import FoundEffect, FoundIn
 from calibeam.simulation.mechanism_table import NoMechanismError, at_the_end, mechanism_of
 from calibeam.simulation.rig_in_numbers import light_of
 from calibrate.errors import DataError
-from calibrate.model.effect_records import Effect
+from calibrate.model.effect_records import EffectRecord
 from calibrate.model.effects.ports import Perturbation, Place
 from calibrate.model.model_file import ModelFile
 from calibrate.model.predict import Predictor
@@ -81,7 +81,7 @@ def _refuse_unknown(model: ModelFile, without: Sequence[str]) -> None:
         raise DataError(f"--without {wrong}: the model has no effect of this name; it has {known}")
 
 
-def _acting(model: ModelFile, same_recording: bool) -> tuple[list[tuple[Effect, bool]], tuple[str, ...]]:
+def _acting(model: ModelFile, same_recording: bool) -> tuple[list[tuple[EffectRecord, bool]], tuple[str, ...]]:
     """Effects that act, and whether they have happened before the first sample; and what does not act here."""
     if same_recording:
         return [(effect, False) for effect in model.effects if not effect.after], ()

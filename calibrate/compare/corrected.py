@@ -21,7 +21,7 @@ from calibrate.compare.chain import Pair, columns_of
 from calibrate.compare.seated import is_seated
 from calibrate.diagnose.state import EffectProblem, Fitted, Session, noise_of, session_of
 from calibrate.errors import DataError
-from calibrate.fit.identify.session import about_of, believed_sigma
+from calibrate.fit.identify.session import about_of, assumed_sigma
 from calibrate.fit.solvers import NEAR_START, solve
 from calibrate.model.predict import Predictor
 from calibrate.model.sensors import (
@@ -92,7 +92,7 @@ def simulated_of(rig: Rig, samples: Samples) -> Simulated:
     """
     session = compared_session(rig, samples)
     rows = tuple(np.arange(m.problem.rows) for m in session.measured)
-    whiteners = tuple(_diagonal(1.0 / believed_sigma(m)) for m in session.measured)
+    whiteners = tuple(_diagonal(1.0 / assumed_sigma(m)) for m in session.measured)
     problem = EffectProblem(session, session.chain(), rows, whiteners)
     fit = solve(problem, start=session.start, damping=NEAR_START)
     noise = noise_of(problem, fit)

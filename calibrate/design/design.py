@@ -133,7 +133,7 @@ AHEAD = 1.5  # times as many poses, between which the steepness is taken
 
 
 @dataclass(frozen=True)
-class Asked:
+class DesignOptions:
     """How a plan is to be."""
 
     poses: int = 60  # readings, repeats among them
@@ -143,7 +143,7 @@ class Asked:
 
 
 @dataclass(frozen=True)
-class Curve:
+class ErrorByPoses:
     """Predicted error over the workspace by number of poses, m: chosen one by one, and drawn at random (median)."""
 
     poses: NDArray[np.intp]
@@ -156,14 +156,14 @@ class Curve:
 class Design:
     """A plan and what it promises. Lengths are rms of the target over the workspace, three axes together."""
 
-    asked: Asked
+    asked: DesignOptions
     candidates: Candidates
     information: Information
     choice: Choice
     in_time: Ordered
     taken: Taken
     plan: PosePlan
-    curve: Curve
+    curve: ErrorByPoses
     free_space_m: float
     random_m: float  # as many poses drawn from the candidates, median
     scale_sigma: float
@@ -173,7 +173,7 @@ def design(
     rig: Rig,
     candidates: Candidates,
     found: Information,
-    asked: Asked,
+    asked: DesignOptions,
     progress: Progress = lambda what, done, total: None,
 ) -> Design:
     """DataError for an unknown criterion, or fewer candidates than poses."""
@@ -205,7 +205,7 @@ def design(
     return Design(asked, candidates, found, choice, in_time, shots, plan, curve, promised, drawn, scale)
 
 
-def _check(rig: Rig, candidates: Candidates, asked: Asked) -> None:
+def _check(rig: Rig, candidates: Candidates, asked: DesignOptions) -> None:
     if asked.criterion not in CRITERIA:
         raise DataError(f"criterion '{asked.criterion}': there are {', '.join(CRITERIA)}")
     if not 0 <= asked.repeats < asked.poses:
@@ -223,7 +223,7 @@ def _random_m(found: Information, poses: int, rng: np.random.Generator) -> float
     return float(np.median([found.free_space_m(A) for A in drawn]))
 
 
-def _curve(found: Information, asked: Asked, rng: np.random.Generator) -> Curve:
+def _curve(found: Information, asked: DesignOptions, rng: np.random.Generator) -> ErrorByPoses:
     """One by one by the determinant, whatever the criterion: one list for all numbers."""
     total = len(found.rows)
     most = min(total, max(20, round(LONGEST * asked.poses)))
@@ -231,7 +231,7 @@ def _curve(found: Information, asked: Asked, rng: np.random.Generator) -> Curve:
     at = np.unique(np.linspace(max(4, most // 30), most, 30).astype(np.intp))
     error = np.array([found.free_space_m(found.of(np.array(chosen[:n]))) for n in at])
     drawn = np.array([_random_m(found, int(n), rng) for n in at])
-    return Curve(at, error, drawn, enough_of(at, error))
+    return ErrorByPoses(at, error, drawn, enough_of(at, error))
 
 
 def enough_of(poses: NDArray[np.intp], error_m: Floats) -> int | None:

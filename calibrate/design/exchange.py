@@ -66,7 +66,7 @@ class _Rows:
 
 
 @dataclass(frozen=True)
-class FreeSpace(_Rows):
+class WorkspaceError(_Rows):
     """Mean square error of the target over the workspace, m^2."""
 
     weight: Floats
@@ -118,7 +118,7 @@ class Index(_Rows):
 
 
 def _free_space(found: Information) -> Criterion:
-    return FreeSpace(found.rows, found.before, found.target_weight)
+    return WorkspaceError(found.rows, found.before, found.target_weight)
 
 
 def _determinant(found: Information) -> Criterion:

@@ -35,7 +35,7 @@ TOOL = ("tool.x", "tool.y", "tool.z")
 
 
 @dataclass(frozen=True)
-class Target:
+class DesignTarget:
     """Derivatives by all unknowns of a fit, rigid motions taken out."""
 
     says: str
@@ -45,7 +45,7 @@ class Target:
 
 def target_of(
     rig: Rig, arm: KinematicModel, parameters: tuple[Parameter, ...], start: Floats, rng: Generator
-) -> Target:
+) -> DesignTarget:
     """By the `parameters` of a fit, at their values `start`; those of the arm are among them."""
     q = rng.uniform(*limits_of(rig), (POSES, rig.n_joints))
     column = index_of(parameters)
@@ -90,7 +90,7 @@ def _points(rig: Rig, T: Floats, column: dict[str, int], start: Floats) -> tuple
     return points, np.tile(across, (len(ALONG_M), 1, 1)), moves
 
 
-def _shaped(says: str, points: Floats, by: Floats, across: Floats) -> Target:
+def _shaped(says: str, points: Floats, by: Floats, across: Floats) -> DesignTarget:
     n, _, params = by.shape
     rigid = across @ np.concatenate([np.tile(np.eye(3), (n, 1, 1)), -cross_matrix(points)], axis=2)
     Q = np.linalg.qr(rigid.reshape(3 * n, 6))[0]
@@ -98,7 +98,7 @@ def _shaped(says: str, points: Floats, by: Floats, across: Floats) -> Target:
     flat = flat - Q @ (Q.T @ flat)
     spread = (across @ (points - points.mean(axis=0))[:, :, None]).ravel()
     spread = spread - Q @ (Q.T @ spread)
-    return Target(says, flat / np.sqrt(n), spread @ flat / (spread @ spread))
+    return DesignTarget(says, flat / np.sqrt(n), spread @ flat / (spread @ spread))
 
 
 NO_OPINION = 3.0  # plausible sizes: assumed of an unknown of which nobody has an opinion; far above any sigma found

@@ -17,7 +17,7 @@ from calibrate.design.candidates import Candidates, Taken
 from calibrate.diagnose.doubts import Isolability, Named, Smallest, isolability, named, smallest_visible
 from calibrate.diagnose.search import Bench
 from calibrate.diagnose.state import fit_geometry, session_of
-from calibrate.model.dual_psd_rig import believed_noise
+from calibrate.model.dual_psd_rig import assumed_noise
 from calibrate.model.sensors.position import POSITION_BELIEVED_M
 
 Floats = NDArray[np.float64]
@@ -47,7 +47,7 @@ def seen_by(rig: Rig, candidates: Candidates, taken: Taken, rng: Generator) -> S
     """Of a plan's poses in their order, with their approaches and repeats. DataError where they are too few to fit."""
     poses = candidates.take(taken.poses)
     reading = poses.reading + rng.normal(0.0, _noise_m(rig, poses), poses.reading.shape)
-    q_rad = poses.q_rad + rng.normal(0.0, believed_noise(rig).joint_rad, poses.q_rad.shape)
+    q_rad = poses.q_rad + rng.normal(0.0, assumed_noise(rig).joint_rad, poses.q_rad.shape)
     samples = Candidates(q_rad, reading, poses.placement, poses.first_psd).samples(taken.approach, taken.repeat)
     bench = Bench(fit_geometry(session_of(_without_distances(rig), samples)))
     told = isolability(bench.menu)
@@ -58,7 +58,7 @@ def seen_by(rig: Rig, candidates: Candidates, taken: Taken, rng: Generator) -> S
 
 def _noise_m(rig: Rig, poses: Candidates) -> float:
     if poses.spots:
-        return believed_noise(rig).psd_m
+        return assumed_noise(rig).psd_m
     return rig.noise.position_m or POSITION_BELIEVED_M
 
 

@@ -38,7 +38,7 @@ from calibrate.diagnose.stages import (
 from calibrate.diagnose.state.fitted import Fitted, fit_geometry
 from calibrate.diagnose.state.session import Session, session_of
 from calibrate.fit.identify.session import columns_of
-from calibrate.model.checks.gross_error import Blunder, BlunderKind, err_alike, postures
+from calibrate.model.checks.gross_error import GrossError, GrossErrorKind, err_alike, postures
 from calibrate.model.effects.catalogue import missing_of
 from calibrate.model.effects.term import Missing
 from calibrate.model.problem import Measured
@@ -68,7 +68,7 @@ class Diagnosed:
     """`physics` is None where nothing was sought: the whole file is wrong, no geometry fits, or samples are too few."""
 
     cleared: Cleared
-    blunders: tuple[Blunder, ...]  # of the file, and rows that no model explains
+    blunders: tuple[GrossError, ...]  # of the file, and rows that no model explains
     physics: Physics | None
     incomplete: tuple[Incomplete, ...] = ()  # stages without a result, where there is no physics
 
@@ -121,7 +121,7 @@ def diagnose_samples(
     return Diagnosed(cleared, cleared.blunders + left, physics)
 
 
-def _another_arm(geometry: Fitted) -> Blunder | None:
+def _another_arm(geometry: Fitted) -> GrossError | None:
     """Where the fitted arm stays far beside the readings: no physics moves an arm so, and what would be named is none.
 
     Of readings that are lengths before the arm; spots on a detector are smaller than that, whatever is wrong.
@@ -136,7 +136,7 @@ def _another_arm(geometry: Fitted) -> Blunder | None:
                 f"{100.0 * away_m / reach_m:.2g} % of a reach of {reach_m:.2g} m: no arm of this table"
             )
             remedy = "check the table, the order and signs of the joints, the units, and whether rows belong together"
-            return Blunder(BlunderKind.ANOTHER_ARM, (), "rig file, arm", what, remedy)
+            return GrossError(GrossErrorKind.ANOTHER_ARM, (), "rig file, arm", what, remedy)
     return None
 
 
@@ -179,10 +179,10 @@ def _with_unexplained(diagnosis: Diagnosis, more: tuple[Unexplained, ...]) -> Di
     return replace(diagnosis, unexplained=(*diagnosis.unexplained, *more), verdict=verdict)
 
 
-def _left(model: Fitted, cleared: Cleared) -> tuple[tuple[Blunder, ...], tuple[Unexplained, ...]]:
+def _left(model: Fitted, cleared: Cleared) -> tuple[tuple[GrossError, ...], tuple[Unexplained, ...]]:
     """Rows that stay far off after all physics: they had next to no weight. Then those that err one after another."""
     by_name = {m.name: m for m in model.session.measured}
-    out: list[Blunder] = []
+    out: list[GrossError] = []
     together: list[Unexplained] = []
     for unseen in model.held_out(model.active):
         if unseen.instrument == ENCODER_DIFFERENCE:
@@ -221,10 +221,10 @@ def _together(rows: Ints, share: float, p: float) -> Unexplained:
     return Unexplained("", (TIME,), share, p, why)
 
 
-def _far(measured: Measured, row: int, away_m: float, sigmas: float) -> Blunder:
+def _far(measured: Measured, row: int, away_m: float, sigmas: float) -> GrossError:
     what = f"{1e6 * away_m:.3g} µm away from what all other rows predict ({sigmas:.0f} sigma), also after all physics"
-    return Blunder(
-        BlunderKind.BAD_SHOT, (row,), ", ".join(columns_of(measured)), what, "measure it again, or remove it"
+    return GrossError(
+        GrossErrorKind.BAD_SHOT, (row,), ", ".join(columns_of(measured)), what, "measure it again, or remove it"
     )
 
 

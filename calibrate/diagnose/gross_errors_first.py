@@ -27,7 +27,7 @@ from calibrate.fit.identify.rounds import distances, wary_fit
 from calibrate.fit.identify.session import columns_of, shots_of
 from calibrate.model.alignment import rigid_motion
 from calibrate.model.arms.catalogue import arm_of
-from calibrate.model.checks.gross_error import Blunder, BlunderKind, Shots, err_alike, postures
+from calibrate.model.checks.gross_error import GrossError, GrossErrorKind, Shots, err_alike, postures
 from calibrate.model.checks.rough_fit import rough_fit, sessions_apart
 from calibrate.model.checks.witness import by_target
 from calibrate.model.effects.moved import LIMIT
@@ -49,7 +49,7 @@ class Cleared:
 
     samples: Samples
     rows: Ints
-    blunders: tuple[Blunder, ...]
+    blunders: tuple[GrossError, ...]
 
     @property
     def whole_file(self) -> bool:
@@ -80,17 +80,17 @@ def place_of(samples: Samples) -> Ints:
     return np.full(len(samples), -1, dtype=np.intp)
 
 
-def _kept(samples: Samples, blunders: list[Blunder]) -> Ints:
+def _kept(samples: Samples, blunders: list[GrossError]) -> Ints:
     refuse_most(tuple(blunders), len(samples)) if blunders else None
     return np.setdiff1d(np.arange(len(samples)), rows_of(blunders))
 
 
-def _counted(blunder: Blunder, kept: Ints) -> Blunder:
+def _counted(blunder: GrossError, kept: Ints) -> GrossError:
     """Rows of the file instead of rows of what was kept."""
     return replace(blunder, rows=tuple(int(kept[row]) for row in blunder.rows))
 
 
-def _joined(rig: Rig, samples: Samples) -> list[Blunder]:
+def _joined(rig: Rig, samples: Samples) -> list[GrossError]:
     """Blocks of positions in a frame so far off that nothing was bumped: another session."""
     if POSITION[0] not in samples:
         return []
@@ -98,13 +98,13 @@ def _joined(rig: Rig, samples: Samples) -> list[Blunder]:
     rows = np.flatnonzero(np.isfinite(positions[:, 0]))
     arm = arm_of(rig)
     flange = arm.flange(start_values(arm.parameters), samples.joints()[rows])
-    out: list[Blunder] = []
+    out: list[GrossError] = []
     for theirs, point in by_target(rig, samples, rows):
         out += _joined_among(flange[np.searchsorted(rows, theirs)], positions[theirs], point, theirs)
     return out
 
 
-def _joined_among(flange: Floats, positions: Floats, point: Floats | None, rows: NDArray[np.intp]) -> list[Blunder]:
+def _joined_among(flange: Floats, positions: Floats, point: Floats | None, rows: NDArray[np.intp]) -> list[GrossError]:
     """Of one target: flange poses (row, 4, 4) nominal, positions (row, 3) of these rows, its point (3,)."""
     found = sessions_apart(flange, positions, point, rows)
     if not found:
@@ -123,12 +123,12 @@ def _elsewhere(expected: Floats, observed: Floats, block: NDArray[np.bool_]) -> 
     return max(moved_m, float(Rotation.from_matrix(linear).magnitude())) > LIMIT
 
 
-def _wild(session: Session) -> list[Blunder]:
+def _wild(session: Session) -> list[GrossError]:
     """Single rows, and blocks farther off than a bump; rows count in the session's samples."""
     theta = wary_fit(session.weighting, session.start)
     problem = session.weighting.problem(theta)
     place = place_of(session.samples)
-    out: list[Blunder] = []
+    out: list[GrossError] = []
     every = zip(session.measured, distances(problem, theta), strict=False)  # known lengths come last and are no rows
     for index, (measured, distance) in enumerate(every):
         if measured.problem.rows < FEWEST_ROWS or measured.name == ENCODER_DIFFERENCE:
@@ -159,14 +159,14 @@ def lasting_rows(apart: NDArray[np.bool_], place: Ints, shots: Shots) -> Ints:
     return block[~err_alike(shots.misfit(), postures(shots.q_rad), block, others)]
 
 
-def _blocks(measured: Measured, block: Ints, away_m: Floats, limit_m: float) -> list[Blunder]:
+def _blocks(measured: Measured, block: Ints, away_m: Floats, limit_m: float) -> list[GrossError]:
     """Rows that follow one another, all farther off than a bump moves anything."""
     if len(block) == 0 or float(np.median(away_m[block])) < limit_m:
         return []
     rows = tuple(sorted(int(r) for r in measured.sample_rows[block, -1]))
     what = f"{1e3 * float(np.median(away_m[block])):.3g} mm from where all other rows have it"
     remedy = "another session was joined here, or something was put elsewhere: diagnose them as a file of their own"
-    return [Blunder(BlunderKind.OTHER_SESSION, rows, ", ".join(columns_of(measured)), what, remedy)]
+    return [GrossError(GrossErrorKind.OTHER_SESSION, rows, ", ".join(columns_of(measured)), what, remedy)]
 
 
 def _limit_m(session: Session, measured: Measured) -> float:
@@ -174,8 +174,10 @@ def _limit_m(session: Session, measured: Measured) -> float:
     return min(LIMIT, kind_of(measured.name).far_m(session.rig))
 
 
-def _pair(measured: Measured, i: int, away_m: float) -> Blunder:
+def _pair(measured: Measured, i: int, away_m: float) -> GrossError:
     """Of a pair of rows it is open which one is wrong."""
     rows = tuple(sorted(int(r) for r in measured.sample_rows[i]))
     what = f"{measured.name} {1e3 * away_m:.3g} mm away from what all other rows predict"
-    return Blunder(BlunderKind.BAD_SHOT, rows, ", ".join(columns_of(measured)), what, "take both again, or remove them")
+    return GrossError(
+        GrossErrorKind.BAD_SHOT, rows, ", ".join(columns_of(measured)), what, "take both again, or remove them"
+    )

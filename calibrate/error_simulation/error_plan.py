@@ -38,9 +38,9 @@ from acquisition.recording.files.bounds import (
 from acquisition.recording.rig import Rig
 from calibrate.error_simulation.machine import Machine, slot
 from calibrate.error_simulation.sources import (
+    ErrorSource,
     Law,
-    Source,
-    Term,
+    SourceTerm,
     Wave,
 )
 from calibrate.errors import DataError
@@ -111,11 +111,11 @@ def _contradictions(plan: ErrorPlan) -> Iterator[tuple[KeyPath, str]]:
 
 ANGLE = 6  # component of a joint's angle
 LENGTHS, ANGLES = "link lengths", "link angles"
-Terms = Callable[[Machine, int, float], tuple[Term, ...]]
+Terms = Callable[[Machine, int, float], tuple[SourceTerm, ...]]
 
 
 @dataclass(frozen=True)
-class Kind:
+class ErrorKind:
     """One kind at one place. `terms` of (machine, index of the place, order)."""
 
     place: str  # "link": parts 0 ... n; "joint": joints 1 ... n; "heat": the arm, then links
@@ -132,63 +132,63 @@ class Possible:
     """A source that the machine may have, before its size is stated."""
 
     name: str
-    kind: Kind
+    kind: ErrorKind
     index: int  # of the part, or of the joint from 0
 
-    def terms(self, machine: Machine, order: float | None) -> tuple[Term, ...]:
+    def terms(self, machine: Machine, order: float | None) -> tuple[SourceTerm, ...]:
         """Where it acts."""
         return self.kind.terms(machine, self.index, self.kind.order if order is None else order)
 
 
 def _part(component: int) -> Terms:
-    return lambda machine, part, order: (Term(slot(part, component)),)
+    return lambda machine, part, order: (SourceTerm(slot(part, component)),)
 
 
-def _angle(machine: Machine, joint: int, order: float) -> tuple[Term, ...]:
-    return (Term(slot(joint, ANGLE)),)
+def _angle(machine: Machine, joint: int, order: float) -> tuple[SourceTerm, ...]:
+    return (SourceTerm(slot(joint, ANGLE)),)
 
 
-def _angle_wave(machine: Machine, joint: int, order: float) -> tuple[Term, ...]:
-    return (Term(slot(joint, ANGLE), wave=Wave(joint, order)),)
+def _angle_wave(machine: Machine, joint: int, order: float) -> tuple[SourceTerm, ...]:
+    return (SourceTerm(slot(joint, ANGLE), wave=Wave(joint, order)),)
 
 
-def _axial(machine: Machine, joint: int, order: float) -> tuple[Term, ...]:
-    return (Term(slot(joint, 2), wave=Wave(joint, order)),)
+def _axial(machine: Machine, joint: int, order: float) -> tuple[SourceTerm, ...]:
+    return (SourceTerm(slot(joint, 2), wave=Wave(joint, order)),)
 
 
 def _circle(first: int) -> Terms:
     """Components `first`, the next one: cosine and sine."""
     return lambda machine, joint, order: (
-        Term(slot(joint, first), wave=Wave(joint, order, cosine=True)),
-        Term(slot(joint, first + 1), wave=Wave(joint, order)),
+        SourceTerm(slot(joint, first), wave=Wave(joint, order, cosine=True)),
+        SourceTerm(slot(joint, first + 1), wave=Wave(joint, order)),
     )
 
 
-def _growth(machine: Machine, part: int, order: float) -> tuple[Term, ...]:
+def _growth(machine: Machine, part: int, order: float) -> tuple[SourceTerm, ...]:
     """Of one fixed part along itself, for one unit of strain; seen in the frame behind it. The flange's probe, too."""
     length = machine.fixed[part, :3, :3].T @ machine.fixed[part, :3, 3]
     if part == machine.n_joints:
         length = length + machine.point_m
-    return tuple(Term(slot(part, axis), weight=float(x)) for axis, x in enumerate(length) if abs(x) > 0.0)
+    return tuple(SourceTerm(slot(part, axis), weight=float(x)) for axis, x in enumerate(length) if abs(x) > 0.0)
 
 
-def _growth_of_all(machine: Machine, index: int, order: float) -> tuple[Term, ...]:
+def _growth_of_all(machine: Machine, index: int, order: float) -> tuple[SourceTerm, ...]:
     return tuple(term for part in range(machine.n_joints + 1) for term in _growth(machine, part, order))
 
 
 KINDS = (
-    *(Kind("link", axis, LENGTHS, "m", _part(i)) for i, axis in enumerate(("x", "y", "z"))),
-    *(Kind("link", axis, ANGLES, "rad", _part(3 + i)) for i, axis in enumerate(("roll", "pitch", "yaw"))),
-    Kind("joint", "zero", "joint zeros", "rad", _angle),
-    Kind("joint", "noise", "reading noise", "rad", _angle),
-    Kind("joint", "quantisation", "quantisation", "rad", _angle),
-    Kind("joint", "eccentricity", "encoder eccentricity", "rad", _angle_wave),
-    Kind("joint", "graduation", "encoder graduation", "rad", _angle_wave, order=2.0, ordered=True),
-    Kind("joint", "runout-radial", "joint runout", "m", _circle(0), ordered=True),
-    Kind("joint", "runout-axial", "joint runout", "m", _axial, ordered=True),
-    Kind("joint", "wobble", "axis wobble", "rad", _circle(3), ordered=True),
-    Kind("heat", "arm", "heat", "K", _growth_of_all),
-    Kind("heat", "link", "heat", "K", _growth),
+    *(ErrorKind("link", axis, LENGTHS, "m", _part(i)) for i, axis in enumerate(("x", "y", "z"))),
+    *(ErrorKind("link", axis, ANGLES, "rad", _part(3 + i)) for i, axis in enumerate(("roll", "pitch", "yaw"))),
+    ErrorKind("joint", "zero", "joint zeros", "rad", _angle),
+    ErrorKind("joint", "noise", "reading noise", "rad", _angle),
+    ErrorKind("joint", "quantisation", "quantisation", "rad", _angle),
+    ErrorKind("joint", "eccentricity", "encoder eccentricity", "rad", _angle_wave),
+    ErrorKind("joint", "graduation", "encoder graduation", "rad", _angle_wave, order=2.0, ordered=True),
+    ErrorKind("joint", "runout-radial", "joint runout", "m", _circle(0), ordered=True),
+    ErrorKind("joint", "runout-axial", "joint runout", "m", _axial, ordered=True),
+    ErrorKind("joint", "wobble", "axis wobble", "rad", _circle(3), ordered=True),
+    ErrorKind("heat", "arm", "heat", "K", _growth_of_all),
+    ErrorKind("heat", "link", "heat", "K", _growth),
 )
 
 
@@ -221,7 +221,7 @@ def sources_of(
     only: tuple[str, ...] = (),
     *,
     identified: bool = False,
-) -> tuple[Source, ...]:
+) -> tuple[ErrorSource, ...]:
     """Of `only` these patterns, where there are any. `identified`: links and zeros are no longer off nominal.
 
     DataError where a pattern matches nothing, where heat has no expansion, and where no source is left.
@@ -242,15 +242,15 @@ def sources_of(
     return tuple(_source(machine, every[name], laws[name], orders.get(name), plan) for name in chosen)
 
 
-def _source(machine: Machine, one: Possible, law: Law, order: float | None, plan: ErrorPlan) -> Source:
+def _source(machine: Machine, one: Possible, law: Law, order: float | None, plan: ErrorPlan) -> ErrorSource:
     if order is not None and not one.kind.ordered:
         raise DataError(f"source {one.name}: it has no order; leave order = {order:g} out")
     terms = one.terms(machine, order)
     if one.kind.unit == HEAT:
         if plan.expansion_per_k is None:
             raise DataError(f"source {one.name}: heat needs expansion_per_k of the links' material; state it")
-        terms = tuple(Term(t.slot, t.weight * plan.expansion_per_k) for t in terms)
-    return Source(one.name, one.kind.group, one.kind.unit, law, terms)
+        terms = tuple(SourceTerm(t.slot, t.weight * plan.expansion_per_k) for t in terms)
+    return ErrorSource(one.name, one.kind.group, one.kind.unit, law, terms)
 
 
 def _believed(rig: Rig, every: Iterable[Possible], *, identified: bool) -> Iterator[tuple[str, Law]]:

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from acquisition.recording.rig import Rig
-from calibrate.error_simulation.sources import Law, Source
+from calibrate.error_simulation.sources import ErrorSource, Law
 from calibrate.model.arms.compiled import PER_PART, perturbed_points
 from calibrate.model.arms.rig_arm import RigArm
 from calibrate.model.model_file import ModelFile
@@ -133,7 +133,7 @@ class ArmAtPoses:
         return np.stack([self.probes_m(pose, nothing)[:, 0] for pose in range(len(self.angle_rad))])
 
 
-def columns_of(sources: Sequence[Source]) -> Columns:
+def columns_of(sources: Sequence[ErrorSource]) -> Columns:
     """Values in the order of the sources, then the second columns of phased ones."""
     of_source = np.full((len(sources), 2), -1)
     of_source[:, 0] = np.arange(len(sources))
@@ -142,7 +142,7 @@ def columns_of(sources: Sequence[Source]) -> Columns:
     return Columns(tuple(source.law for source in sources), of_source)
 
 
-def arm_at(machine: Machine, sources: Sequence[Source], columns: Columns, q_rad: Floats) -> ArmAtPoses:
+def arm_at(machine: Machine, sources: Sequence[ErrorSource], columns: Columns, q_rad: Floats) -> ArmAtPoses:
     """The machine at readings (pose, joint), with every term of every source."""
     slots, index, weights = list[int](), list[int](), list[Floats]()
     for source, own in zip(sources, columns.of_source.tolist(), strict=True):

@@ -19,7 +19,7 @@ from calibrate.error_simulation.machine import (
     arm_at,
     columns_of,
 )
-from calibrate.error_simulation.sources import Source
+from calibrate.error_simulation.sources import ErrorSource
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -89,7 +89,7 @@ class Drawn:
 
 def draw_arms(
     machine: Machine,
-    sources: Sequence[Source],
+    sources: Sequence[ErrorSource],
     q_rad: Floats,
     arms: int,
     *,

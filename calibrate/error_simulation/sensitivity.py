@@ -29,7 +29,7 @@ from calibrate.error_simulation.machine import (
     columns_of,
     probe_errors,
 )
-from calibrate.error_simulation.sources import Source
+from calibrate.error_simulation.sources import ErrorSource
 
 Floats = NDArray[np.float64]
 ROUNDING_M = 1e-15  # of a probe some metres away: what moves it by less moves it not at all
@@ -71,7 +71,7 @@ class Linear:
         return variance / max(float(variance.sum()), 1e-300)
 
 
-def propagate(machine: Machine, sources: Sequence[Source], q_rad: Floats) -> Linear:
+def propagate(machine: Machine, sources: Sequence[ErrorSource], q_rad: Floats) -> Linear:
     """At readings (pose, joint)."""
     by_slot = machine.by_slot(q_rad)
     mean, covariance = np.zeros((len(sources), len(q_rad), 3)), np.zeros((len(sources), len(q_rad), 3, 3))
@@ -100,7 +100,7 @@ class Single:
     gain: float  # rms error of the probe by a unit of the source, at no error: m/m, m/rad, m/K
 
 
-def alone(machine: Machine, source: Source, q_rad: Floats) -> Single:
+def alone(machine: Machine, source: ErrorSource, q_rad: Floats) -> Single:
     """Over readings (pose, joint)."""
     columns = columns_of([source])
     arm = arm_at(machine, [source], columns, q_rad)
@@ -122,7 +122,7 @@ def alone(machine: Machine, source: Source, q_rad: Floats) -> Single:
     return Single(source.name, source.group, source.unit, value, rms, largest, gain)
 
 
-def each_alone(machine: Machine, sources: Sequence[Source], q_rad: Floats) -> tuple[Single, ...]:
+def each_alone(machine: Machine, sources: Sequence[ErrorSource], q_rad: Floats) -> tuple[Single, ...]:
     """In the order of the sources."""
     return tuple(alone(machine, source, q_rad) for source in sources)
 
@@ -145,7 +145,7 @@ class SobolIndices:
 
 def indices_of(
     machine: Machine,
-    sources: Sequence[Source],
+    sources: Sequence[ErrorSource],
     q_rad: Floats,
     *,
     seed: int,
@@ -173,7 +173,7 @@ def indices_of(
 
 
 def _once(
-    sources: Sequence[Source],
+    sources: Sequence[ErrorSource],
     columns: Columns,
     arm: ArmAtPoses,
     nominal_m: Floats,
@@ -203,7 +203,7 @@ def _once(
     return weight @ np.reshape(found.first_order, shape), weight @ np.reshape(found.total_order, shape)
 
 
-def _values(sources: Sequence[Source], columns: Columns, shares: Floats) -> Floats:
+def _values(sources: Sequence[ErrorSource], columns: Columns, shares: Floats) -> Floats:
     """(point, column) of shares in 0 ... 1 of every column."""
     out = np.zeros_like(shares)
     for source, (own, phase) in zip(sources, columns.of_source.tolist(), strict=True):

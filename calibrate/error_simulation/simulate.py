@@ -30,7 +30,7 @@ from calibrate.error_simulation.sensitivity import (
     indices_of,
     propagate,
 )
-from calibrate.error_simulation.sources import Source
+from calibrate.error_simulation.sources import ErrorSource
 from calibrate.errors import DataError
 
 Floats = NDArray[np.float64]
@@ -57,7 +57,7 @@ class Asked:
 
 
 @dataclass(frozen=True)
-class Line:
+class ErrorLine:
     """One line of the budget."""
 
     group: str
@@ -76,7 +76,7 @@ class Posture:
 
 
 def worst_postures(
-    machine: Machine, sources: Sequence[Source], rng: Generator, count: int = 5, drawn: int = DRAWN
+    machine: Machine, sources: Sequence[ErrorSource], rng: Generator, count: int = 5, drawn: int = DRAWN
 ) -> tuple[Posture, ...]:
     """The worst first; none where nothing moves the probe, for then all postures are alike."""
     q_rad = machine.drawn_poses(drawn, rng)
@@ -94,7 +94,7 @@ def worst_postures(
     return tuple(Posture(q, machine.tip_m(q[None])[0], error) for error, q in kept[:count])
 
 
-def _climbed(machine: Machine, sources: Sequence[Source], start: Floats) -> tuple[float, Floats]:
+def _climbed(machine: Machine, sources: Sequence[ErrorSource], start: Floats) -> tuple[float, Floats]:
     scale = float(propagate(machine, sources, start[None]).rms_m[0])
 
     def falling(q: Floats) -> tuple[float, Floats]:
@@ -120,7 +120,7 @@ class Simulation:
     """`wide` are poses all over the workspace, `drawn_at` those at which arms were drawn."""
 
     machine: Machine
-    sources: tuple[Source, ...]
+    sources: tuple[ErrorSource, ...]
     asked: Asked
     wide_rad: Floats  # (pose, joint)
     wide: Linear
@@ -137,14 +137,14 @@ class Simulation:
         return bool(self.wide.rms_m.max() > ROUNDING_M)
 
     @property
-    def budget(self) -> tuple[Line, ...]:
+    def budget(self) -> tuple[ErrorLine, ...]:
         """By group, the largest first."""
-        out: list[Line] = []
+        out: list[ErrorLine] = []
         alone, shares = self.wide.alone_m, self.wide.shares
         for group in dict.fromkeys(source.group for source in self.sources):
             mine = np.array([source.group == group for source in self.sources])
             rms = float(np.sqrt(np.mean(_of(self.wide, mine).rms_m ** 2)))
-            out.append(Line(group, int(mine.sum()), rms, float(shares[mine].sum())))
+            out.append(ErrorLine(group, int(mine.sum()), rms, float(shares[mine].sum())))
         return tuple(sorted(out, key=lambda line: -line.rms_m)) if len(alone) else ()
 
     @property
@@ -159,7 +159,7 @@ def _of(linear: Linear, mine: NDArray[np.bool_]) -> Linear:
 
 def simulate(
     machine: Machine,
-    sources: Sequence[Source],
+    sources: Sequence[ErrorSource],
     asked: Asked,
     progress: Progress = lambda what, done, total: None,
 ) -> Simulation:

@@ -160,7 +160,7 @@ class Wave:
 
 
 @dataclass(frozen=True)
-class Term:
+class SourceTerm:
     """What a source adds to a slot: weight times its value, times the wave where there is one."""
 
     slot: int
@@ -180,14 +180,14 @@ class Term:
 
 
 @dataclass(frozen=True)
-class Source:
+class ErrorSource:
     """`terms` either all have a wave or none."""
 
     name: str  # "link2.x"
     group: str  # line of the error budget: "link lengths"
     unit: str  # "m", "rad" or "K", of the law
     law: Law
-    terms: tuple[Term, ...]
+    terms: tuple[SourceTerm, ...]
 
     @property
     def phased(self) -> bool:

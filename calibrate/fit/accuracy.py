@@ -80,14 +80,14 @@ class Workspace:
 
 
 @dataclass(frozen=True)
-class Scatter:
+class PoseScatter:
     """One sigma of what differs from pose to pose: of every joint reading, and of the target along any axis."""
 
     joint_rad: float = 0.0
     target_m: float = 0.0
 
 
-NO_SCATTER = Scatter()
+NO_SCATTER = PoseScatter()
 
 
 @dataclass(frozen=True)
@@ -109,7 +109,7 @@ def free_space_error(
     seen: Identifiability,
     workspace: Workspace,
     rng: Generator,
-    scatter: Scatter = NO_SCATTER,
+    scatter: PoseScatter = NO_SCATTER,
 ) -> FreeSpaceError:
     """Prediction for the arm `model` whose parameters (and those of the tool) are among those of `fit`, by name.
 
@@ -153,7 +153,7 @@ def without_rigid_motion(points_m: Floats, by_parameter: Floats) -> Floats:
 
 
 def variance_of_scatter(
-    model: KinematicModel, fit: Valued, points_m: Floats, q_rad: Floats, scatter: Scatter
+    model: KinematicModel, fit: Valued, points_m: Floats, q_rad: Floats, scatter: PoseScatter
 ) -> Floats:
     """(pose,) variance of the target, three axes together."""
     column = index_of(fit.parameters)

@@ -20,7 +20,7 @@ from calibrate.fit.weighting import Weighting
 from calibrate.model.alignment import Alignment
 from calibrate.model.arms.catalogue import arm_of
 from calibrate.model.chain import KinematicModel
-from calibrate.model.dual_psd_rig import believed_noise
+from calibrate.model.dual_psd_rig import assumed_noise
 from calibrate.model.observations import Angles
 from calibrate.model.parameters import start_values
 from calibrate.model.problem import Measured
@@ -70,7 +70,7 @@ def instruments_of(
             "x_m y_m z_m, camera_x_m ..., wire_m, seat, or bar with bar_end"
         )
     known = tuple(block for kind, found in built if found is not None for block in kind.lengths(table))
-    weighting = Weighting(measured, believed_noise(rig).joint_rad, known)
+    weighting = Weighting(measured, assumed_noise(rig).joint_rad, known)
     used = np.unique(np.concatenate([instrument.sample_rows.ravel() for instrument in measured]))
     unused = np.setdiff1d(np.arange(len(samples)), used)
     return Instruments(weighting, _start(table, weighting), table.alignment, unused)

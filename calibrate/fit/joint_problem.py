@@ -1,6 +1,6 @@
 """Several instruments in one fit: blocks of whitened rows side by side, parameters of one name are one unknown.
 
-Rows of one sample whose noise is shared with second encoders are made independent (fit/noise/shared_scatter.py).
+Rows of one sample whose noise is shared with second encoders are made independent (fit/noise/scatter.py).
 """
 
 from dataclasses import dataclass, replace

@@ -3,7 +3,7 @@
 Noise of a row is joint repeatability mapped through the arm, G G' joint^2 with G the derivative by the readings, plus
 the instrument's own. Which pose a row belongs to is known to the instrument alone, so this holds for pairs of poses
 too. Neighbouring distances share a pose, which their weights respect. What second encoders see of the joints at a pose
-is taken out of the rows of the others there (fit/noise/shared_scatter.py). Otherwise rows of two instruments at one
+is taken out of the rows of the others there (fit/noise/scatter.py). Otherwise rows of two instruments at one
 pose (a position and a wire) are taken as independent, and sizes of noise are found as if all rows were.
 """
 
@@ -29,7 +29,7 @@ from calibrate.fit.noise.variance import (
     FIXED,
     NoisyRows,
     VarianceFactors,
-    as_believed,
+    as_assumed,
     covariance_of,
 )
 from calibrate.model.parameters import Parameter, priors, start_values
@@ -71,7 +71,7 @@ class Weighting:
     @property
     def believed(self) -> VarianceFactors:
         """Every source as large as assumed."""
-        return as_believed(len(self.sources))
+        return as_assumed(len(self.sources))
 
     def problem(self, theta: Floats, factors: VarianceFactors | None = None) -> JointProblem:
         """The joint problem with weights from the noise at `theta` (param,), as assumed without `factors`."""

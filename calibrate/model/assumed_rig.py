@@ -24,7 +24,7 @@ Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class BelievedArm(RigArm):
+class AssumedArm(RigArm):
     """Implements `acquisition.centring.aim.BelievedArm`."""
 
     laser_origin_m: Floats  # (3,) in the flange
@@ -47,14 +47,14 @@ class BelievedArm(RigArm):
         return R @ self.laser_origin_m + T_base_flange[:3, 3], R @ self.laser_direction
 
 
-def believed_arm(rig: Rig, corrections: Mapping[str, float] | None = None) -> BelievedArm:
+def assumed_arm(rig: Rig, corrections: Mapping[str, float] | None = None) -> AssumedArm:
     """`corrections`: fitted values by parameter name, of which it takes those of arm and laser. DataError: no laser."""
     laser, given = laser_of(rig), corrections or {}
     known = {p.name for p in laser.parameters}
     mount = values_by_name(laser.parameters, {k: v for k, v in given.items() if k in known})
     origin_m, direction = laser.in_flange(mount)
     unit = direction / np.linalg.norm(direction)
-    return BelievedArm(**vars(RigArm.of_rig(rig, given)), laser_origin_m=origin_m, laser_direction=unit)
+    return AssumedArm(**vars(RigArm.of_rig(rig, given)), laser_origin_m=origin_m, laser_direction=unit)
 
 
 class Light(Enum):
@@ -87,7 +87,7 @@ class FixtureView:
         return Light.BOTH_LIT if float(np.abs(hit.spots_m).max()) <= self._half_size_m else Light.OFF_FACE
 
 
-class BelievedFixture:
+class AssumedFixture:
     """The fixture in its own frame, that of PSD 1."""
 
     def __init__(self, T_psd1_psd2: Floats, half_size_m: float) -> None:
@@ -136,7 +136,7 @@ class Expected:
     light: Light
 
 
-class BelievedRig:
+class AssumedRig:
     """Rig file plus, if there are any, fitted corrections by parameter name; immutable."""
 
     def __init__(self, rig: Rig, corrections: Mapping[str, float] | None = None) -> None:
@@ -145,8 +145,8 @@ class BelievedRig:
         sensor, chain = dual_psd_of(rig, ids, np.ones_like(ids)), dual_psd_chain(rig, ids, np.ones_like(ids))
         phi = values_by_name(chain.parameters, corrections or {})[len(chain.model.parameters) :]
         pair, half_size_m = sensor.T_psd1_psd2(phi), sensor.fixture.half_size_m
-        self.arm = believed_arm(rig, corrections)
-        self.fixture = BelievedFixture(pair, half_size_m)
+        self.arm = assumed_arm(rig, corrections)
+        self.fixture = AssumedFixture(pair, half_size_m)
         self.T_psd1_psd2 = pair
         self._gain = phi[4:8]
         self._poses = {int(k): sensor.T_base_psd1(phi, int(k)) for k in ids}

@@ -14,13 +14,13 @@ from calibrate.model.sensors.spots import fixture_of as fixture_of
 from calibrate.model.sensors.spots import laser_of as laser_of
 from calibrate.model.sensors.spots import psd_sigma_m
 
-JOINT_BELIEVED_RAD = (
+JOINT_ASSUMED_RAD = (
     1e-5  # 10 µm at 1 m reach: repeatability class of small arms (calibration data sheets: 0.01-0.03 mm)
 )
 
 
 @dataclass(frozen=True)
-class BelievedNoise:
+class AssumedNoise:
     """One sigma as the rig file states it; a start value only."""
 
     joint_rad: float
@@ -30,11 +30,11 @@ class BelievedNoise:
 def dual_psd_chain(rig: Rig, placement: NDArray[np.int64], first_psd: NDArray[np.int64]) -> Chain:
     """The rig's arm with its dual PSD, for poses with these placements and orders (pose,), (pose,).
 
-    Links and detectors as [tolerance] states them, without one as default_belief.py.
+    Links and detectors as [tolerance] states them, without one as default_tolerance.py.
     """
     return Chain(arm_of(rig, links_of(rig)), dual_psd_of(rig, placement, first_psd))
 
 
-def believed_noise(rig: Rig) -> BelievedNoise:
+def assumed_noise(rig: Rig) -> AssumedNoise:
     """The rig's [noise]; what is missing there is a usual value, since the data decide anyway."""
-    return BelievedNoise(rig.noise.joint_rad or JOINT_BELIEVED_RAD, psd_sigma_m(rig))
+    return AssumedNoise(rig.noise.joint_rad or JOINT_ASSUMED_RAD, psd_sigma_m(rig))

@@ -15,11 +15,11 @@ Component = Annotated[int, Meta(ge=0, le=15)]  # of a port: six of a frame, one 
 Waves = Annotated[int, Meta(ge=1, le=64)]  # of a curve over each of its drivers
 
 
-class Record(Struct, frozen=True, forbid_unknown_fields=True):
+class StrictRecord(Struct, frozen=True, forbid_unknown_fields=True):
     """Every part of it."""
 
 
-class EffectParameter(Record, frozen=True):
+class EffectParameter(StrictRecord, frozen=True):
     """As a person reads it; null where the data do not determine it."""
 
     value: Number | None
@@ -27,7 +27,7 @@ class EffectParameter(Record, frozen=True):
     unit: Label
 
 
-class EffectCurve(Record, frozen=True):
+class EffectCurve(StrictRecord, frozen=True):
     """What an unknown cause of one driver adds at its port, and one sigma of it, at knots over the recorded range."""
 
     driver: Name
@@ -41,7 +41,7 @@ class EffectCurve(Record, frozen=True):
             raise ValueError("knots, values and sigma of a curve are of different lengths")
 
 
-class Effect(Record, frozen=True):
+class EffectRecord(StrictRecord, frozen=True):
     """One piece of physics. `coefficients` and `inner` are what a prediction takes, by their names in `covariance`."""
 
     name: Name
@@ -73,7 +73,7 @@ class Effect(Record, frozen=True):
                 raise ValueError(f"range.{shown(driver)} ends below its start: {low} to {high}")
 
 
-class SessionRecord(Record, frozen=True):
+class SessionRecord(StrictRecord, frozen=True):
     """The recording that the effects were found in, and the conditions that they are stated about."""
 
     started_utc: Label
@@ -91,7 +91,7 @@ class SessionRecord(Record, frozen=True):
             )
 
 
-def check_physics(schema: int, effects: Sequence[Effect], session: SessionRecord | None) -> None:
+def check_physics(schema: int, effects: Sequence[EffectRecord], session: SessionRecord | None) -> None:
     """ValueError where effects contradict each other, or what they are stated about is missing."""
     if effects and schema == 1:
         raise ValueError("schema 1 holds no effects; a model with effects is of schema 2")

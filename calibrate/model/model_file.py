@@ -28,7 +28,7 @@ from acquisition.recording.files.bounds import (
 from acquisition.recording.output import json_output
 from acquisition.recording.samples import Samples, measured_sha256, readings_sha256
 from calibrate.errors import DataError
-from calibrate.model.effect_records import Effect, SessionRecord, check_physics
+from calibrate.model.effect_records import EffectRecord, SessionRecord, check_physics
 from calibrate.model.older_models import with_present_names
 from calibrate.model.parameters import Parameter
 from calibrate.model.sensors.catalogue import BY_NAME, FRAMES
@@ -53,7 +53,7 @@ class RigIdentity(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     text: FileText | None = None
 
 
-class Unseen(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+class UnseenRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Parameters that can only be determined together."""
 
     words: Sentence
@@ -122,7 +122,7 @@ class ObservabilityRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=Tru
     parameters: Count
 
 
-class FreeSpaceRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+class WorkspaceErrorRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Predicted error of the target over the workspace; numbers null where `status` has the reason."""
 
     status: Label
@@ -174,7 +174,7 @@ class ModelFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     free: Count
     condition: Statistic | None
     singular_values: Many[Statistic]
-    unseen: Many[Unseen]
+    unseen: Many[UnseenRecord]
     parameters: Many[ModelParameter]
     chain: dict[Name, Correction]
     covariance: Covariance | None
@@ -192,12 +192,12 @@ class ModelFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     proofs: Many[UnseenRows] = ()
     unproven: Many[Sentence] = ()
     observability: ObservabilityRecord | None = None
-    free_space: FreeSpaceRecord | None = None
+    free_space: WorkspaceErrorRecord | None = None
     bootstrap: BootstrapRecord | None = None
     plan: FileText | None = None
     fit: FitRecord | None = None  # absent in models of earlier versions
     readings_sha256: Label | None = None  # which joint angles it was made of (acquisition/recording/samples.py)
-    effects: Many[Effect] = ()
+    effects: Many[EffectRecord] = ()
     needs: Many[Name] = ()
     session: SessionRecord | None = None
     measured_sha256: Label | None = None  # and which measurements; absent in models of earlier versions
@@ -253,7 +253,7 @@ def _other(content: dict[str, Any]) -> str | None:
 
 
 def corrections(model: ModelFile) -> dict[str, float]:
-    """The complete set of values for predictions, by parameter name: what `believed.BelievedRig` takes."""
+    """The complete set of values for predictions, by parameter name: what `AssumedRig` takes."""
     return dict(model.chain)
 
 

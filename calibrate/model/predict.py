@@ -108,9 +108,9 @@ class Predictor:
     def turn_of_target(self) -> Floats:
         """(3, 3) orientation of a 6-D target in the flange."""
         about = self.about.get("tool", NOWHERE)
-        believed = Rotation.from_rotvec(about[3:6] if len(about) == 6 else NOWHERE[:3])
+        nominal = Rotation.from_rotvec(about[3:6] if len(about) == 6 else NOWHERE[:3])
         found = [self.values.get(f"tool.{a}", 0.0) for a in ("roll", "pitch", "yaw")]
-        return (believed * Rotation.from_rotvec(found)).as_matrix()
+        return (nominal * Rotation.from_rotvec(found)).as_matrix()
 
     def spots_m(self, q_rad: Floats, placement: NDArray[np.int64], first_psd: NDArray[np.int64]) -> Floats:
         """(pose, 4) psd1 x, y, psd2 x, y, at joint readings (pose, joint)."""

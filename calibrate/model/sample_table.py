@@ -122,8 +122,10 @@ class SampleTable:
         named = self.samples.integers(TARGET, 0)[rows]
         if not self.rig.targets:
             if len(seen := sorted(set(named.tolist()) - {0})) > 1:
-                told = ", ".join(map(str, seen))
-                raise DataError(f"samples: targets {told}, but rig {self.rig.name} has no [[target]]; add one for each")
+                numbers = ", ".join(map(str, seen))
+                raise DataError(
+                    f"samples: targets {numbers}, but rig {self.rig.name} has no [[target]]; add one for each"
+                )
             return None
         return targets_of(self.rig, named) if named.any() else None
 

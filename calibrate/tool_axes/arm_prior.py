@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibrate.errors import DataError
-from calibrate.model.arms.link_tolerance import LinkBelief
+from calibrate.model.arms.link_tolerance import LinkTolerance
 from calibrate.model.chain import KinematicModel
 from calibrate.model.model_file import ModelFile
 from calibrate.model.parameters import Parameter, index_of, start_values
@@ -46,9 +46,9 @@ class ArmErrors:
                 )
 
     @property
-    def links(self) -> LinkBelief:
+    def links(self) -> LinkTolerance:
         """Of the links, to build the arm with."""
-        return LinkBelief(self.length_sigma_m, self.angle_sigma_rad)
+        return LinkTolerance(self.length_sigma_m, self.angle_sigma_rad)
 
 
 @dataclass(frozen=True)

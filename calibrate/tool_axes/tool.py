@@ -37,9 +37,9 @@ from calibrate.tool_axes.orientation import (
     orientation_of,
 )
 from calibrate.tool_axes.wrist_fit import (
-    Noise,
+    AxisNoise,
+    SeenOverPrior,
     TargetRows,
-    Witness,
     WristFit,
     WristProblem,
     other_rows_witness,
@@ -123,7 +123,7 @@ class ToolCalibration:
     flange: FlangeSeen | None
     prior: ArmPrior  # as used
     widened: float  # factor of the prior's sigmas
-    noise: Noise
+    noise: AxisNoise
     other_rows: int
     other_rms_m: float | None  # of a coordinate, in the rows that took no part; None: there are none
 
@@ -222,11 +222,11 @@ def _in_flange(arm: KinematicModel, prior: ArmPrior, begun: _Begun, T_base_devic
 
 def _witnesses(
     found: WristFit, others: tuple[TargetRows, ...], T_base_device: Floats
-) -> tuple[tuple[tuple[Witness, str], ...], float | None]:
+) -> tuple[tuple[tuple[SeenOverPrior, str], ...], float | None]:
     """What speaks about the size of the arm's errors, each in a sentence, and the rms of the rows without part."""
     if not np.all(np.isfinite(found.fit.covariance)):
         return (), None
-    out: list[tuple[Witness, str]] = []
+    out: list[tuple[SeenOverPrior, str]] = []
     axes = wrist_witness(found)
     if axes is not None:
         says = f"the last two axes differ from the arm's table by {axes.ratio:.1f} times the assumed uncertainty"
@@ -241,7 +241,7 @@ def _witnesses(
     return tuple(out), None if rest is None else rest[1]
 
 
-def _undetermined(found: WristFit, witnesses: tuple[tuple[Witness, str], ...]) -> str | None:
+def _undetermined(found: WristFit, witnesses: tuple[tuple[SeenOverPrior, str], ...]) -> str | None:
     fit = found.fit
     if fit.status is not Status.CONVERGED or not np.all(np.isfinite(fit.covariance)):
         return fit.status.value

@@ -72,7 +72,7 @@ class TargetRows:
 
 
 @dataclass(frozen=True)
-class Noise:
+class AxisNoise:
     """One sigma of a coordinate and of a turn about one axis, as the residuals show them."""
 
     position_m: float
@@ -87,7 +87,7 @@ class WristFit:
     prior: ArmPrior
     problem: JointProblem  # whitened by `noise`; the last block is the prior
     fit: Fit
-    noise: Noise
+    noise: AxisNoise
     start_m: Floats  # (target, 3) that `target<k>.x`, y, z are about
     start_turn: Floats  # (target, 3, 3) that roll, pitch, yaw are about
 
@@ -133,7 +133,7 @@ class WristProblem:
         turns = np.array([_start_turn(arm, mean, t, T_base_device) for t in targets])
         return cls(arm, targets, start_m, turns, T_base_device)
 
-    def fit(self, prior: ArmPrior, noise: Noise, begin: Floats | None = None) -> WristFit:
+    def fit(self, prior: ArmPrior, noise: AxisNoise, begin: Floats | None = None) -> WristFit:
         """Least squares under the prior with these weights, from the start or from values `begin` (param,)."""
         parameters = free_parameters(self.arm, prior)
         blocks = tuple(self._block(k, parameters, noise) for k in range(len(self.targets)))
@@ -144,14 +144,14 @@ class WristProblem:
             fit = solve(problem, start=begin, damping=NEAR_START)
         return WristFit(self.arm, prior, problem, fit, noise, self.start_m, self.start_turn)
 
-    def noise(self, prior: ArmPrior, scatter_m: float) -> Noise:
+    def noise(self, prior: ArmPrior, scatter_m: float) -> AxisNoise:
         """Of each kind of reading, from `scatter_m` on: residual sum of squares over degrees of freedom.
 
         These are rows less leverage (Foerstner's estimate, in which restricted maximum likelihood ends). The prior is
         taken wide here: what an arm beyond its prior misses must not pass for noise of the instrument.
         """
         wide = prior.scaled(WIDE)
-        found = self.fit(wide, Noise(max(scatter_m, LEAST_NOISE), FIRST_TURN_RAD))
+        found = self.fit(wide, AxisNoise(max(scatter_m, LEAST_NOISE), FIRST_TURN_RAD))
         for _ in range(ROUNDS):
             if not np.all(np.isfinite(found.fit.covariance)):
                 break
@@ -161,7 +161,7 @@ class WristProblem:
             found = self.fit(wide, after, found.fit.theta)
         return found.noise
 
-    def _block(self, k: int, parameters: tuple[Parameter, ...], noise: Noise) -> Problem:
+    def _block(self, k: int, parameters: tuple[Parameter, ...], noise: AxisNoise) -> Problem:
         target = self.targets[k]
         chain, observed = chain_of(self.arm, target, self.start_m[k], self.start_turn[k], self.T_base_device)
         own = chain.sensor.parameters
@@ -192,13 +192,13 @@ def _start_turn(arm: KinematicModel, mean: Floats, target: TargetRows, T_base_de
     return Rotation.from_matrix(np.swapaxes(R_device_flange, 1, 2) @ target.rotation).mean().as_matrix()
 
 
-def _noise(found: WristFit, targets: tuple[TargetRows, ...]) -> Noise:
+def _noise(found: WristFit, targets: tuple[TargetRows, ...]) -> AxisNoise:
     theta, rows = found.fit.theta, found.data_rows
     residual = found.problem.residual(theta)[:rows]
     J = found.problem.jacobian(theta)[:rows]
     freedom = 1.0 - np.einsum("ij,jk,ik->i", J, found.fit.covariance, J)
     turn = np.concatenate([_is_turn(t) for t in targets])
-    return Noise(
+    return AxisNoise(
         found.noise.position_m * _factor(residual[~turn], freedom[~turn], found.noise.position_m),
         found.noise.turn_rad * _factor(residual[turn], freedom[turn], found.noise.turn_rad),
     )
@@ -216,7 +216,7 @@ def _factor(residual: Floats, freedom: Floats, noise: float) -> float:
     return max(float(np.sqrt(residual @ residual / max(freedom.sum(), 1.0))), LEAST_NOISE / noise)
 
 
-def _settled(before: Noise, after: Noise) -> bool:
+def _settled(before: AxisNoise, after: AxisNoise) -> bool:
     change = (after.position_m / before.position_m - 1.0, after.turn_rad / before.turn_rad - 1.0)
     return max(abs(c) for c in change) < SETTLED
 
@@ -227,7 +227,7 @@ MOST_ROWS = 200  # that are predicted with their full covariance, spread over al
 
 
 @dataclass(frozen=True)
-class Witness:
+class SeenOverPrior:
     """Size of what is seen over what the prior expects: root of the mean square."""
 
     ratio: float
@@ -239,7 +239,7 @@ class Witness:
         return self.ratio > 1.0 and self.chance < UNLIKELY
 
 
-def wrist_witness(found: WristFit) -> Witness | None:
+def wrist_witness(found: WristFit) -> SeenOverPrior | None:
     """The arm's estimated parameters against their prior; None where the wrist determines nothing of them.
 
     Of an arm of the prior the whitened estimates have the covariance 1 - C, with C the whitened posterior one.
@@ -258,12 +258,12 @@ def wrist_witness(found: WristFit) -> Witness | None:
     if k == 0:
         return None
     q = float(np.sum((vector[:, seen].T @ u) ** 2 / value[seen]))
-    return Witness(float(np.sqrt(q / k)), float(chi2.sf(q, k)), float(k))
+    return SeenOverPrior(float(np.sqrt(q / k)), float(chi2.sf(q, k)), float(k))
 
 
 def other_rows_witness(
     found: WristFit, others: tuple[TargetRows, ...], T_base_device: Floats
-) -> tuple[Witness, float] | None:
+) -> tuple[SeenOverPrior, float] | None:
     """Rows that took no part against their prediction, with the rms (m) of a coordinate; None without such rows.
 
     The sum of squares has the mean and variance of a chi-square with fewer degrees of freedom (Satterthwaite,
@@ -288,4 +288,4 @@ def other_rows_witness(
     trace = float(np.trace(S))
     k = trace**2 / float(np.sum(S**2))
     square = float(r @ r) / trace
-    return Witness(float(np.sqrt(square)), float(chi2.sf(k * square, k)), k), float(np.sqrt(np.mean(r**2)))
+    return SeenOverPrior(float(np.sqrt(square)), float(chi2.sf(k * square, k)), k), float(np.sqrt(np.mean(r**2)))

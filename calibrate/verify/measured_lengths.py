@@ -163,7 +163,7 @@ class Length:
 
 
 @dataclass(frozen=True, eq=False)
-class Measured:
+class BallPlaces:
     """Places of the probe's ball (row, 3) m in the base, by the identified arm."""
 
     rig: Rig
@@ -173,11 +173,11 @@ class Measured:
     left_out: tuple[str, ...] = ()  # series of touches that show no sphere, and why
 
 
-def measured(samples: Samples, rig: Rig, predictor: Predictor) -> Measured:
+def measured(samples: Samples, rig: Rig, predictor: Predictor) -> BallPlaces:
     """Sorted by artefact. DataError where there is none, or one that the rig does not know."""
     tips_m = predictor.tip_m(samples.joints())
     touches, left_out = _round(_touches(samples, rig, tips_m))
-    found = Measured(rig, _seats(samples, tips_m), touches, _lengths(samples, rig, tips_m), left_out)
+    found = BallPlaces(rig, _seats(samples, tips_m), touches, _lengths(samples, rig, tips_m), left_out)
     if not (found.seats or found.touches or found.lengths):
         raise DataError(
             "samples: nothing to verify by; columns of it are seat, bar with bar_end, and sphere with series: "

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from calibrate.errors import DataError
 from calibrate.verify.measured_lengths import (
     LEAST,
+    BallPlaces,
     Figure,
-    Measured,
     Source,
     Sphere,
     enclosing_diameter_m,
@@ -62,7 +62,7 @@ LENGTH = Source(
 )
 
 
-def iso10360_12_figures(measured: Measured) -> tuple[Figure, ...]:
+def iso10360_12_figures(measured: BallPlaces) -> tuple[Figure, ...]:
     """All that the recording allows; what it does not hold is reported as such."""
     return (
         _of_spheres(measured, "P_Size", "probing size error", SIZE, measured.rig.mpe.p_size_m, _size),
@@ -73,22 +73,22 @@ def iso10360_12_figures(measured: Measured) -> tuple[Figure, ...]:
     )
 
 
-def _size(sphere: Sphere, measured: Measured, number: int) -> float:
+def _size(sphere: Sphere, measured: BallPlaces, number: int) -> float:
     probe_m = measured.rig.tool.probe_diameter_m or 0.0
     return 2.0 * sphere.radius_m - probe_m - measured.rig.spheres[number].diameter_m
 
 
-def _form(sphere: Sphere, measured: Measured, number: int) -> float:
+def _form(sphere: Sphere, measured: BallPlaces, number: int) -> float:
     return float(np.ptp(sphere.distance_m))
 
 
 def _of_spheres(
-    measured: Measured,
+    measured: BallPlaces,
     symbol: str,
     says: str,
     source: Source,
     permitted_m: float | None,
-    value: Callable[[Sphere, Measured, int], float],
+    value: Callable[[Sphere, BallPlaces, int], float],
 ) -> Figure:
     each: list[tuple[str, float, float | None]] = []
     for (number, series), touches_m in measured.touches.items():
@@ -99,7 +99,7 @@ def _of_spheres(
     return worst_of(symbol, says, source, each, whole, SIZE_SPHERES)
 
 
-def _location(measured: Measured) -> Figure:
+def _location(measured: BallPlaces) -> Figure:
     permitted_m = measured.rig.mpe.l_dia_m
     each: list[tuple[str, float, float | None]] = []
     most = 0
@@ -113,7 +113,7 @@ def _location(measured: Measured) -> Figure:
     return worst_of("L_Dia", "articulated location error", LOCATION, each, most, ISO_ARTICULATIONS)
 
 
-def _seat_location(measured: Measured) -> Figure:
+def _seat_location(measured: BallPlaces) -> Figure:
     permitted_m = measured.rig.mpe.l_dia_m
     each = [
         (f"cone {number}, {len(places_m)} articulations", enclosing_diameter_m(places_m), permitted_m)
@@ -124,7 +124,7 @@ def _seat_location(measured: Measured) -> Figure:
     return worst_of("L_Dia at a seat", "location of the probe in a cone", SEAT_LOCATION, each, most, ISO_ARTICULATIONS)
 
 
-def _length(measured: Measured) -> Figure:
+def _length(measured: BallPlaces) -> Figure:
     mpe = measured.rig.mpe
     each = [
         (one.says, one.error_m, None if mpe.e_uni_m is None else mpe.e_uni_m + mpe.e_uni_per_m * one.calibrated_m)
@@ -151,7 +151,7 @@ def worst_of(
     )
 
 
-def refuse_without_probe(measured: Measured) -> None:
+def refuse_without_probe(measured: BallPlaces) -> None:
     """DataError where spheres were touched and the size of the probe's ball is not stated."""
     if measured.touches and measured.rig.tool.probe_diameter_m is None:
         raise DataError("samples: spheres were touched, but the rig's [tool] has no probe_diameter_m; add it")
@@ -182,12 +182,12 @@ VOLUMETRIC = Source(
 )
 
 
-def b89_4_22_figures(measured: Measured) -> tuple[Figure, ...]:
+def b89_4_22_figures(measured: BallPlaces) -> tuple[Figure, ...]:
     """All that the recording allows; what it does not hold is reported as such."""
     return (_diameter(measured), _single_point(measured), _volumetric(measured))
 
 
-def _diameter(measured: Measured) -> Figure:
+def _diameter(measured: BallPlaces) -> Figure:
     probe_m, permitted_m = measured.rig.tool.probe_diameter_m or 0.0, measured.rig.mpe.effective_diameter_m
     each: list[tuple[str, float, float | None]] = []
     for (number, series), touches_m in measured.touches.items():
@@ -199,7 +199,7 @@ def _diameter(measured: Measured) -> Figure:
     return worst_of("effective diameter", says, DIAMETER, each, len(each), DIAMETER_TIMES)
 
 
-def _single_point(measured: Measured) -> Figure:
+def _single_point(measured: BallPlaces) -> Figure:
     permitted_m = measured.rig.mpe.single_point_m
     each: list[tuple[str, float, float | None]] = []
     farthest_m, most = 0.0, 0
@@ -215,7 +215,7 @@ def _single_point(measured: Measured) -> Figure:
     )
 
 
-def _volumetric(measured: Measured) -> Figure:
+def _volumetric(measured: BallPlaces) -> Figure:
     permitted_m = measured.rig.mpe.volumetric_m
     errors_m = np.array([length.error_m for length in measured.lengths])
     each = [(length.says, length.error_m, permitted_m) for length in measured.lengths]

@@ -17,13 +17,13 @@ from calibrate.model.model_file import ModelFile
 from calibrate.model.predict import Predictor
 from calibrate.verify import standards
 from calibrate.verify.measured_lengths import (
+    BallPlaces,
     Figure,
     Judgement,
-    Measured,
     measured,
 )
 
-STANDARDS: tuple[Callable[[Measured], tuple[Figure, ...]], ...] = (
+STANDARDS: tuple[Callable[[BallPlaces], tuple[Figure, ...]], ...] = (
     standards.iso10360_12_figures,
     standards.b89_4_22_figures,
 )

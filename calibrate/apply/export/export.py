@@ -30,7 +30,7 @@ from calibrate.apply.export.nominal_table import json_text, nominal_table_text
 from calibrate.apply.export.robot_description import mjcf_text, urdf_text
 from calibrate.errors import DataError
 from calibrate.fit.fit_plan import ZEROS_ONLY_COMMAND
-from calibrate.model.effect_records import Effect
+from calibrate.model.effect_records import EffectRecord
 from calibrate.model.model_file import ModelFile, corrections
 from calibrate.plug_ins import EXPORTS, loaded
 
@@ -202,11 +202,11 @@ def _refuse_coupled(rig: Rig, form: ExportForm) -> None:
         raise DataError(f"rig {rig.name}: joint {followers[0]} follows another joint, and {form.uncoupled}")
 
 
-def _linear_compliance(rig: Rig, model: ModelFile) -> dict[str, tuple[Effect, float]]:
+def _linear_compliance(rig: Rig, model: ModelFile) -> dict[str, tuple[EffectRecord, float]]:
     """Name -> effect and rad / (N m): joints that yield in proportion to the torque of the stated masses."""
     if not all(joint.mass_kg for joint in rig.arm.joints):
         return {}
-    out: dict[str, tuple[Effect, float]] = {}
+    out: dict[str, tuple[EffectRecord, float]] = {}
     for effect in model.effects:
         compliance = effect.parameters.get(COMPLIANCE)
         plain = effect.physics == "joint-compliance" and effect.shape == "linear" and not effect.variant

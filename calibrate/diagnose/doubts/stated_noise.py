@@ -20,7 +20,7 @@ from calibrate.diagnose.search.tail import Tail
 from calibrate.diagnose.state.fitted import Fitted
 from calibrate.diagnose.state.linearised import Unseen, tame
 from calibrate.diagnose.state.noise_of_fit import freedom
-from calibrate.fit.identify.session import believed_sigma
+from calibrate.fit.identify.session import assumed_sigma
 from calibrate.model.checks.gross_error import postures
 from calibrate.model.effects.term import Missing
 from calibrate.model.sensors.catalogue import kind_of
@@ -152,7 +152,7 @@ def _own(model: Fitted, i: int, quantity: Quantity) -> Floats:
     what the rig file states that of a reading: a reading may be as bad as the worse of the two.
     """
     measured, noise = model.session.measured[i], model.session.rig.noise
-    own = believed_sigma(measured)[model.problem.rows[i]][:, quantity.part]
+    own = assumed_sigma(measured)[model.problem.rows[i]][:, quantity.part]
     for key in _keys(kind_of(measured.name), quantity):
         own = np.maximum(own, getattr(noise, key, None) or 0.0)
     return own

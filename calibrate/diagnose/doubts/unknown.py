@@ -35,7 +35,7 @@ from calibrate.diagnose.search.searching import (
     holds,
 )
 from calibrate.diagnose.search.tail import Tail
-from calibrate.model.effects.curve import Curve
+from calibrate.model.effects.curve import SmoothCurve
 from calibrate.model.effects.ports import Place
 from calibrate.model.effects.term import Accepted, Term
 
@@ -212,7 +212,7 @@ def _balance(new: Term, other: Term) -> bool:
 
 def _spot(term: Term) -> tuple[str, int]:
     """Port, and the component of it where it has several that are no matter of each other."""
-    component = term.component if isinstance(term, Curve) and term.port.place is not Place.JOINTS else -1
+    component = term.component if isinstance(term, SmoothCurve) and term.port.place is not Place.JOINTS else -1
     return term.port.where, component
 
 

@@ -181,7 +181,7 @@ class FreeSpaceRecord(Record, frozen=True):
     poses: Count
 
 
-class BlunderRecord(Record, frozen=True):
+class GrossErrorRecord(Record, frozen=True):
     """A fault of the file: its rows, from 1, took no part, or next to none; without rows all of it is wrong."""
 
     kind: Label
@@ -249,7 +249,7 @@ class DiagnosisFile(Record, frozen=True):
     confusable: tuple[tuple[NameRecord, NameRecord, Statistic], ...] = ()
     not_recorded: Many[NotRecorded] = ()
     derived: Many[Sentence] = ()
-    blunders: Many[BlunderRecord] = ()
+    blunders: Many[GrossErrorRecord] = ()
     streams: StreamsRecord | None = None
     known: KnownRecord | None = None  # of a diagnosis beside a model
     changed: Many[ChangedRecord] = ()

@@ -26,12 +26,12 @@ from calibrate.diagnose.doubts.stated_noise import NoiseFound
 from calibrate.diagnose.from_recording import Diagnosed, Physics
 from calibrate.diagnose.record.schema import (
     SCHEMA,
-    BlunderRecord,
     CurveRecord,
     DiagnosisFile,
     FindingRecord,
     FloorRecord,
     FreeSpaceRecord,
+    GrossErrorRecord,
     IncompleteRecord,
     LackOfFitRecord,
     NameRecord,
@@ -48,7 +48,7 @@ from calibrate.diagnose.record.schema import (
 from calibrate.diagnose.search.bench import Bench
 from calibrate.diagnose.stages import Incomplete, Stage, Stages
 from calibrate.diagnose.state.fitted import Fitted
-from calibrate.model.checks.gross_error import Blunder
+from calibrate.model.checks.gross_error import GrossError
 from calibrate.model.effects.catalogue import EFFECTS
 from calibrate.model.effects.term import Form, Size
 
@@ -83,7 +83,7 @@ def file_of(diagnosed: Diagnosed, recording: Recording) -> DiagnosisFile:
     return _with_physics(diagnosed.physics, rig, blunders)
 
 
-def _with_physics(physics: Physics, rig: RigRecord, blunders: tuple[BlunderRecord, ...]) -> DiagnosisFile:
+def _with_physics(physics: Physics, rig: RigRecord, blunders: tuple[GrossErrorRecord, ...]) -> DiagnosisFile:
     said = physics.diagnosis
     judged = _judged(said)
     floor = next((f for f in said.floors if judged is not None and f.instrument == judged.instrument), None)
@@ -218,8 +218,8 @@ def _confusable(bench: Bench) -> tuple[tuple[NameRecord, NameRecord, float], ...
     return tuple((_name(a), _name(b), r2) for (a, b), r2 in out.items())
 
 
-def _blunder(blunder: Blunder) -> BlunderRecord:
-    return BlunderRecord(blunder.kind.value, tuple(row + 1 for row in blunder.rows), blunder.column, blunder.says)
+def _blunder(blunder: GrossError) -> GrossErrorRecord:
+    return GrossErrorRecord(blunder.kind.value, tuple(row + 1 for row in blunder.rows), blunder.column, blunder.says)
 
 
 def _name(name: Named) -> NameRecord:

@@ -17,7 +17,7 @@ from calibrate.diagnose.search.port_process import (
     processes,
 )
 from calibrate.diagnose.search.score import Removed, bic_gain, scores
-from calibrate.model.effects.curve import Curve
+from calibrate.model.effects.curve import SmoothCurve
 from calibrate.model.effects.ports import Place
 from calibrate.model.effects.term import Accepted, Term
 
@@ -91,11 +91,11 @@ def anything(term: Term) -> bool:
 
 def fitted_curve(bench: Bench, offer: Offer, without: Removed | None) -> Accepted:
     """An offer with its values, a curve with as many waves as the data pay for."""
-    if not isinstance(offer.term, Curve):
+    if not isinstance(offer.term, SmoothCurve):
         return refined(bench, offer.term, offer.inner, without)
     rss = bench.sight.rss + (without.squares if without is not None else 0.0)
 
-    def gain(term: Curve, squares: float) -> float:
+    def gain(term: SmoothCurve, squares: float) -> float:
         return float(bic_gain(np.array(squares), rss, np.array(term.numbers), bench.sight.data))
 
     trials = [replace(offer.term, waves=m) for m in range(2, WAVES[len(offer.term.depends_on)] + 1)]

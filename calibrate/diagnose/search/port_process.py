@@ -17,7 +17,7 @@ from scipy.sparse import csr_matrix
 from calibrate.diagnose.search.bench import Bench
 from calibrate.diagnose.search.score import Removed
 from calibrate.model.effects.curve import (
-    Curve,
+    SmoothCurve,
     acts_at,
     causes_of,
     curve,
@@ -43,7 +43,7 @@ RIDGE = 1e-9  # of a Gram matrix's mean diagonal: far below what any process amp
 class Processes:
     """All ports with all drivers of one number, ready to be asked about any residual."""
 
-    curves: tuple[Curve, ...]
+    curves: tuple[SmoothCurve, ...]
     gram: Floats  # (curve, k, k) on the complement of what is fitted
     absorbed: Floats  # (curve, k, rank) coordinates in the basis of what is fitted
     products: Callable[[Floats], Floats]  # (curve, k, m) of the features with columns (row, m)

@@ -10,7 +10,7 @@ from calibrate.diagnose.search.bench import Bench
 from calibrate.diagnose.search.noise_law import noise_law
 from calibrate.diagnose.search.null import DRAWS, Null, null_of
 from calibrate.diagnose.state.linearised import State
-from calibrate.model.effects.curve import Curve
+from calibrate.model.effects.curve import SmoothCurve
 from calibrate.model.effects.ports import Place
 from calibrate.model.effects.second_encoders import placed
 from calibrate.model.effects.term import Form, Shape, Term
@@ -59,7 +59,7 @@ class Search:
 def taken(bench: Bench, gone: Collection[int]) -> frozenset[Key]:
     """Causes of the accepted terms but those in `gone`, and keys of what their curves hold already."""
     terms = [a.term for i, a in enumerate(bench.state.accepted) if i not in gone]
-    curves = [term for term in terms if isinstance(term, Curve)]
+    curves = [term for term in terms if isinstance(term, SmoothCurve)]
     held = (t.key for t in bench.menu.terms if any(holds(curve, t) for curve in curves)) if curves else ()
     return frozenset(map(cause_of, terms)) | frozenset(held)
 
@@ -68,13 +68,13 @@ def holds(curve: Term, term: Term) -> bool:
     """Whether a smooth curve can be all that a term of the same place is: side by side they would balance each other
     where rows are, and part where there is none.
     """
-    if not isinstance(curve, Curve) or not set(term.depends_on) <= set(curve.depends_on):
+    if not isinstance(curve, SmoothCurve) or not set(term.depends_on) <= set(curve.depends_on):
         return False
     slow = term.shape in SMOOTH and (term.order or 1) <= HELD
     return slow and curve.port == term.port and _within(curve, term)
 
 
-def _within(curve: Curve, term: Term) -> bool:
+def _within(curve: SmoothCurve, term: Term) -> bool:
     """Whether a term of the same port acts through the component of the curve alone."""
     if curve.port.place is Place.JOINTS:
         return True

@@ -23,7 +23,7 @@ from calibrate.diagnose.state.noise_of_fit import (
     whiteners_of,
 )
 from calibrate.diagnose.state.session import Session, drivers_of
-from calibrate.fit.identify.session import believed_sigma
+from calibrate.fit.identify.session import assumed_sigma
 from calibrate.fit.noise import Scatter, likelihood_of
 from calibrate.fit.solvers import (
     FAR_START,
@@ -294,7 +294,7 @@ def fit_geometry(session: Session, active: Ints | None = None) -> Fitted:
     chosen = np.arange(len(session.samples)) if active is None else np.sort(active)
     rows = _rows_of(session, chosen)
     unit = tuple(
-        np.eye(m.problem.observed.shape[1]) / believed_sigma(m)[r].mean()
+        np.eye(m.problem.observed.shape[1]) / assumed_sigma(m)[r].mean()
         for m, r in zip(session.measured, rows, strict=True)
     )
     whiteners = tuple(np.broadcast_to(W, (len(r), *W.shape)) for W, r in zip(unit, rows, strict=True))

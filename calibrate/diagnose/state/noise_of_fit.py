@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibrate.diagnose.state.effect_problem import EffectProblem
-from calibrate.fit.identify.session import believed_sigma
+from calibrate.fit.identify.session import assumed_sigma
 from calibrate.fit.noise import Scatter, SharedScatter, levers_of, likelihood_of, scatter_of, shares_found, witness_of
 from calibrate.fit.solvers import Fit
 from calibrate.model.parameters import plausible_sizes
@@ -54,7 +54,7 @@ def noise_of(problem: EffectProblem, fit: Fit) -> Noise:
 
     def found(i: int, residual: Floats) -> Scatter:
         rows = problem.rows[i]
-        scatter = scatter_of(residual[rows], by_joint[i][rows], believed_sigma(measured[i])[rows])
+        scatter = scatter_of(residual[rows], by_joint[i][rows], assumed_sigma(measured[i])[rows])
         return replace(scatter, covariance=scatter.covariance * larger[i])
 
     witness = witness_of([m.problem.chain for m in measured])

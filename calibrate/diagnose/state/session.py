@@ -17,7 +17,7 @@ from acquisition.recording.rig import Rig, Tolerance
 from calibrate.fit.instruments import instruments_of
 from calibrate.fit.weighting import Weighting
 from calibrate.model.arms.catalogue import arm_of
-from calibrate.model.arms.link_tolerance import LinkBelief
+from calibrate.model.arms.link_tolerance import LinkTolerance
 from calibrate.model.arms.serial import SerialArm
 from calibrate.model.default_tolerance import PAIR, SCALELESS, WIDE
 from calibrate.model.effects.conditions import conditions_of, temperatures_of, uncoupled_samples
@@ -76,14 +76,14 @@ def session_of(rig: Rig, samples: Samples) -> Session:
     return Session(rig, samples, arm, found.weighting, found.start)
 
 
-def _belief(rig: Rig, samples: Samples) -> LinkBelief | None:
+def _belief(rig: Rig, samples: Samples) -> LinkTolerance | None:
     if rig.tolerance is not None:
         return None
     held = [k for k in SENSORS if Trait.TARGET in k.traits and k.columns[0] in samples]
     return SCALELESS if held and all(Trait.SCALELESS in k.traits for k in held) else WIDE
 
 
-def _doubted(rig: Rig, belief: LinkBelief | None) -> Rig:
+def _doubted(rig: Rig, belief: LinkTolerance | None) -> Rig:
     """The rig with a prior about the detectors' bracket, where none is stated.
 
     Gains are held unless the rig leaves them open: they are then a cause to be named.

@@ -33,18 +33,18 @@ from calibrate.fit.identify.fit_report import sizes_of_noise
 from calibrate.fit.identify.record import left_out, noise_fields
 from calibrate.fit.identify.result import POSE, POSITION, alarms_of
 from calibrate.fit.identify.session import NEGLIGIBLE_RAD, about_of, joints_apart
-from calibrate.fit.noise import TOLD, VarianceFactors
+from calibrate.fit.noise import SEPARABLE, VarianceFactors
 from calibrate.fit.rank import Identifiability, analyse
 from calibrate.fit.solvers import Status, Stop
 from calibrate.fit.weighting import JOINT, Weighting
 from calibrate.model.effect_records import (
-    Effect,
     EffectCurve,
     EffectParameter,
+    EffectRecord,
     SessionRecord,
 )
 from calibrate.model.effects.catalogue import holds_of
-from calibrate.model.effects.curve import Curve
+from calibrate.model.effects.curve import SmoothCurve
 from calibrate.model.effects.drivers import Drivers
 from calibrate.model.effects.fixture_moved import CARRIED
 from calibrate.model.effects.ports import Perturbation, Place
@@ -58,7 +58,7 @@ from calibrate.model.model_file import (
     ModelFile,
     ModelParameter,
     RigIdentity,
-    Unseen,
+    UnseenRecord,
     covariance_record,
 )
 from calibrate.model.parameters import (
@@ -141,7 +141,7 @@ def model_of_fit(
         free=seen.n_free,
         condition=seen.condition if np.isfinite(seen.condition) else None,
         singular_values=tuple(seen.singular_values.tolist()),
-        unseen=tuple(Unseen(c.words, c.members, c.structural) for c in seen.combinations),
+        unseen=tuple(UnseenRecord(c.words, c.members, c.structural) for c in seen.combinations),
         parameters=_records(fit, covariance, seen),
         chain={p.name: float(v) for p, v in zip(fit.session.parameters, fit.geometry, strict=True)},
         covariance=covariance_record(parameters, covariance),
@@ -267,8 +267,8 @@ def _conditions(fit: Fitted) -> tuple[dict[str, Floats], tuple[str, ...]]:
 
 def _effects(
     fit: Fitted, findings: tuple[Finding, ...], names: tuple[str, ...], covariance: Floats
-) -> tuple[Effect, ...]:
-    out, bench = list[Effect](), Bench(fit)
+) -> tuple[EffectRecord, ...]:
+    out, bench = list[EffectRecord](), Bench(fit)
     for i, (a, name) in enumerate(zip(fit.accepted, names, strict=True)):
         mine, finding = np.flatnonzero(fit.problem.owner == i), _finding_of(a, findings)
         sizes = sizes_of(bench, i) if finding is None and not a.term.open else None
@@ -277,7 +277,7 @@ def _effects(
     return (*out, *map(_aftermath, lasting))
 
 
-def _aftermath(effect: Effect) -> Effect:
+def _aftermath(effect: EffectRecord) -> EffectRecord:
     """What a slip or a bump leaves: from the end of its session on it is true of the machine."""
     return structs.replace(
         effect,
@@ -294,7 +294,7 @@ def _aftermath(effect: Effect) -> Effect:
 
 def _effect(
     a: Accepted, name: str, finding: Finding | None, drivers: Drivers, own: Floats, stated: Mapping[str, Size] | None
-) -> Effect:
+) -> EffectRecord:
     """`own` (value, value) covariance of its coefficients and smooth inner values; `stated` sizes without a finding."""
     m, term = len(a.coefficients), a.term
     named_so = finding is not None and not term.open and finding.name.physics != UNKNOWN
@@ -309,14 +309,16 @@ def _effect(
         sizes = term.sizes(a.coefficients, own[:m, :m], a.inner, inner_sigma)
     depends_on = ",".join(term.depends_on)
     values = {driver: range_of(drivers, driver) for driver in depends_on.split(",")}
-    return Effect(
+    return EffectRecord(
         name=name,
         where=term.port.where,
         physics=physics,
         depends_on=depends_on,
         shape=term.shape.value,
         order=term.order,
-        variant=SECOND if isinstance(term, Curve) and term.port.instrument == ENCODER_DIFFERENCE else term.variant,
+        variant=SECOND
+        if isinstance(term, SmoothCurve) and term.port.instrument == ENCODER_DIFFERENCE
+        else term.variant,
         parameters={k: _parameter(k, size) for k, size in sizes.items()},
         coefficients={f"{name}.c{j}": float(c) for j, c in enumerate(a.coefficients)},
         inner={s.name: float(v) for s, v in zip(term.inner, a.inner, strict=True)},
@@ -326,10 +328,10 @@ def _effect(
         confidence=None if finding is None else finding.confidence,
         listed="" if physics == term.physics else term.physics,
         curve=_curve(a, drivers, own) if term.open and len(own) == m else None,
-        place=term.port.place.value if isinstance(term, Curve) else "",
-        frame=term.port.index if isinstance(term, Curve) and term.port.place is Place.FRAME else None,
-        component=term.component if isinstance(term, Curve) else None,
-        waves=term.waves if isinstance(term, Curve) else None,
+        place=term.port.place.value if isinstance(term, SmoothCurve) else "",
+        frame=term.port.index if isinstance(term, SmoothCurve) and term.port.place is Place.FRAME else None,
+        component=term.component if isinstance(term, SmoothCurve) else None,
+        waves=term.waves if isinstance(term, SmoothCurve) else None,
     )
 
 
@@ -435,7 +437,7 @@ def _factors(parts: list[Floats], covariances: list[Floats], *, settled: bool) -
         if np.allclose(factor, before, rtol=SAME_VARIANCE):
             break
         last = [np.einsum("s,snij->nij", factor, part) for part in parts]
-    at_zero = (factor < TOLD * sigma) & (factor < 1.0)
+    at_zero = (factor < SEPARABLE * sigma) & (factor < 1.0)
     log_sigma = sigma / np.maximum(factor, sigma)
     return VarianceFactors(np.log(factor), np.diag(log_sigma**2), settled, tuple(at_zero.tolist()))
 

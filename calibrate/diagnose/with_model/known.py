@@ -22,7 +22,7 @@ from calibrate.diagnose.state.fitted import (
 from calibrate.diagnose.state.session import Session
 from calibrate.errors import DataError
 from calibrate.fit.identify.session import about_of
-from calibrate.model.effect_records import Effect
+from calibrate.model.effect_records import EffectRecord
 from calibrate.model.effects.conditions import moves_of
 from calibrate.model.effects.drivers import Drivers
 from calibrate.model.effects.moved import RECORDING
@@ -51,7 +51,7 @@ class Known:
     same_recording: bool
 
     @property
-    def effects(self) -> tuple[Effect, ...]:
+    def effects(self) -> tuple[EffectRecord, ...]:
         """Those that enter."""
         if self.same_recording:
             return tuple(e for e in self.model.effects if not e.after)
@@ -75,7 +75,7 @@ def known_before(model: ModelFile, samples: Samples) -> Known:
     return Known(model, same)
 
 
-def with_structure(effects: tuple[Effect, ...], session: Session) -> tuple[Fitted, Fitted]:
+def with_structure(effects: tuple[EffectRecord, ...], session: Session) -> tuple[Fitted, Fitted]:
     """Geometry alone, and geometry with these effects, both fitted to a recording again.
 
     DataError where an effect needs what the recording does not hold.
@@ -85,7 +85,7 @@ def with_structure(effects: tuple[Effect, ...], session: Session) -> tuple[Fitte
     return geometry, geometry.refitted(terms) if terms else geometry
 
 
-def term_of(effect: Effect, drivers: Drivers) -> Accepted:
+def term_of(effect: EffectRecord, drivers: Drivers) -> Accepted:
     """Of the catalogue, as these drivers allow it, with the values of the model to start from.
 
     DataError where the recording does not hold what the effect needs.

@@ -22,7 +22,7 @@ from calibrate.diagnose.state.session import session_of
 from calibrate.diagnose.with_model.from_diagnosis import model_of_fit
 from calibrate.diagnose.with_model.known import Known, term_of, with_structure
 from calibrate.errors import DataError
-from calibrate.model.effect_records import Effect
+from calibrate.model.effect_records import EffectRecord
 from calibrate.model.effects.drivers import Drivers
 from calibrate.model.effects.moved import RECORDING, SIX
 from calibrate.model.model_file import ModelFile
@@ -85,7 +85,7 @@ def _own_name(where: str, variant: str, name: str) -> str:
     return f"{owner}.{name if name in SIX else plain}"
 
 
-def _effect_of(finding: FindingRecord, effects: tuple[Effect, ...]) -> Effect | None:
+def _effect_of(finding: FindingRecord, effects: tuple[EffectRecord, ...]) -> EffectRecord | None:
     """The known effect of the same physics at the same place by the same drivers."""
     same = (finding.where, finding.physics, finding.depends_on, finding.order)
     return next((e for e in effects if (e.where, e.physics, e.depends_on, e.order) == same), None)
@@ -123,9 +123,9 @@ def refit(known: ModelFile, recording: Recording) -> Refitted:
     return Refitted(structs.replace(model, effects=(*effects, *model.effects[len(effects) :])), tuple(notes))
 
 
-def _possible(effects: tuple[Effect, ...], drivers: Drivers) -> tuple[tuple[Effect, ...], list[str]]:
+def _possible(effects: tuple[EffectRecord, ...], drivers: Drivers) -> tuple[tuple[EffectRecord, ...], list[str]]:
     """Those that this recording can size, and a sentence for each other one."""
-    used, notes = list[Effect](), list[str]()
+    used, notes = list[EffectRecord](), list[str]()
     for effect in effects:
         try:
             term_of(effect, drivers)

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from acquisition.recording import Samples
 from acquisition.recording.samples import BAR, BAR_END, SEAT, Kind, kind_of
 from calibrate.model.checks.gross_error import (
-    Blunder,
-    BlunderKind,
+    GrossError,
+    GrossErrorKind,
     Shots,
     err_alike,
     outlying,
@@ -49,7 +49,7 @@ class _Suspect:
     left: float
 
 
-def bad_rows(shots: Shots, among: Indices | None = None) -> tuple[Blunder, ...]:
+def bad_rows(shots: Shots, among: Indices | None = None) -> tuple[GrossError, ...]:
     """One gross error a row, of those `among` the observations. Nothing where they are too few to show what is usual.
 
     Rows whose neighbours in posture err alike are the arm's.
@@ -64,18 +64,20 @@ def bad_rows(shots: Shots, among: Indices | None = None) -> tuple[Blunder, ...]:
     return tuple(_named(shots, int(i), misfit[i], scale) for i in found)
 
 
-def _named(shots: Shots, i: int, misfit: Floats, scale: float) -> Blunder:
+def _named(shots: Shots, i: int, misfit: Floats, scale: float) -> GrossError:
     rows = (int(shots.rows[i]),)
     suspects = sorted([*_readings(shots, i, misfit), *_angles(shots, i)], key=lambda s: s.left)
     best = suspects[0]
     alone = len(suspects) == 1 or suspects[1].left > CLEARER * max(best.left, scale)
     if len(misfit) > 1 and best.left < EXPLAINED * scale and alone:
         what = f"reads {best.written:.9g} where the other rows give about {best.meant:.6g} {best.unit}"
-        return Blunder(BlunderKind.WRONG_VALUE, rows, best.column, what, "correct the cell, or remove the row")
+        return GrossError(GrossErrorKind.WRONG_VALUE, rows, best.column, what, "correct the cell, or remove the row")
     away = float(np.linalg.norm(misfit * shots.sigma))
     unit = "mrad" if _unit(shots.columns[0]) == "rad" else "mm"
     what = f"{1e3 * away:.3g} {unit} away from what all other rows predict ({np.linalg.norm(misfit) / scale:.0f} sigma)"
-    return Blunder(BlunderKind.BAD_SHOT, rows, ", ".join(shots.columns), what, "measure it again, or remove the row")
+    return GrossError(
+        GrossErrorKind.BAD_SHOT, rows, ", ".join(shots.columns), what, "measure it again, or remove the row"
+    )
 
 
 def _readings(shots: Shots, i: int, misfit: Floats) -> list[_Suspect]:
@@ -126,7 +128,7 @@ def _best_turn(shots: Shots, i: int, j: int) -> tuple[float, float]:
     return turn, float(np.linalg.norm(misfit(np.array([turn]))[0]))
 
 
-def rows_beyond_limits(samples: Samples, limits_rad: Floats) -> tuple[Blunder, ...]:
+def rows_beyond_limits(samples: Samples, limits_rad: Floats) -> tuple[GrossError, ...]:
     """One gross error a row whose angles leave their range (joint, 2)."""
     q_rad = samples.joints()
     beyond = (q_rad < limits_rad[:, 0] - SLACK_RAD) | (q_rad > limits_rad[:, 1] + SLACK_RAD)
@@ -136,17 +138,19 @@ def rows_beyond_limits(samples: Samples, limits_rad: Floats) -> tuple[Blunder, .
     return tuple(_beyond(row, beyond[row], q_rad[row], limits_rad) for row in rows.tolist())
 
 
-def _beyond(row: int, beyond: NDArray[np.bool_], q_rad: Floats, limits_rad: Floats) -> Blunder:
+def _beyond(row: int, beyond: NDArray[np.bool_], q_rad: Floats, limits_rad: Floats) -> GrossError:
     joints = np.flatnonzero(beyond).tolist()
     values = ", ".join(f"{q_rad[j]:g} rad is not within {limits_rad[j, 0]:g} to {limits_rad[j, 1]:g}" for j in joints)
     columns = ", ".join(f"q{j + 1}_rad" for j in joints)
-    return Blunder(BlunderKind.BEYOND_LIMITS, (row,), columns, values, "correct the cell, or the range in the rig")
+    return GrossError(
+        GrossErrorKind.BEYOND_LIMITS, (row,), columns, values, "correct the cell, or the range in the rig"
+    )
 
 
 READINGS = ("psd1_x_m", "x_m", "wire_m")  # columns of instruments whose noise never repeats to the last digit
 
 
-def duplicated_rows(samples: Samples) -> tuple[Blunder, ...]:
+def duplicated_rows(samples: Samples) -> tuple[GrossError, ...]:
     """One gross error per row that repeats an earlier one in every column; its `rows` are the copies only.
 
     The time may differ where an instrument's reading is in the row, since two shots never agree to the last digit;
@@ -177,26 +181,26 @@ def _keys(samples: Samples) -> list[tuple[object, ...]]:
     ]
 
 
-def _copies(original: int, rows: list[int]) -> Blunder:
+def _copies(original: int, rows: list[int]) -> GrossError:
     what = f"a copy of {rows_in_words([original])}, equal in every column"
-    return Blunder(BlunderKind.DUPLICATED_ROWS, tuple(rows), "every column", what, "remove the copies")
+    return GrossError(GrossErrorKind.DUPLICATED_ROWS, tuple(rows), "every column", what, "remove the copies")
 
 
 AGAIN = "take both again, or remove it too"
 
 
-def left_alone(samples: Samples, blunders: Sequence[Blunder]) -> tuple[Blunder, ...]:
+def left_alone(samples: Samples, blunders: Sequence[GrossError]) -> tuple[GrossError, ...]:
     """One gross error for every row that has lost its partner to these gross errors, or to one found here."""
-    copies = {row for b in blunders if b.kind is BlunderKind.DUPLICATED_ROWS for row in b.rows}
+    copies = {row for b in blunders if b.kind is GrossErrorKind.DUPLICATED_ROWS for row in b.rows}
     bad = {row for b in blunders for row in b.rows}
-    out: list[Blunder] = []
+    out: list[GrossError] = []
     while found := [*_ends(samples, copies, bad), *_last_in_seat(samples, bad)]:
         bad |= {row for b in found for row in b.rows}
         out += found
     return tuple(out)
 
 
-def _ends(samples: Samples, copies: set[int], bad: set[int]) -> Iterator[Blunder]:
+def _ends(samples: Samples, copies: set[int], bad: set[int]) -> Iterator[GrossError]:
     """Consecutive rows that have a bar form a pair (calibrate/model/sensors/bar.py); a copy is none of them."""
     with_bar = [row for row in np.flatnonzero(samples.integers(BAR, -1) >= 0).tolist() if row not in copies]
     for pair in zip(with_bar[::2], with_bar[1::2], strict=False):
@@ -205,14 +209,14 @@ def _ends(samples: Samples, copies: set[int], bad: set[int]) -> Iterator[Blunder
             (left,) = set(pair) - gone
             (other,) = gone
             what = f"the other end of this bar, row {other + 1}, is left out"
-            yield Blunder(BlunderKind.LEFT_ALONE, (left,), BAR_END, what, AGAIN)
+            yield GrossError(GrossErrorKind.LEFT_ALONE, (left,), BAR_END, what, AGAIN)
 
 
-def _last_in_seat(samples: Samples, bad: set[int]) -> Iterator[Blunder]:
+def _last_in_seat(samples: Samples, bad: set[int]) -> Iterator[GrossError]:
     """A cone needs two rows to show anything (calibrate/model/sensors/seat.py)."""
     seat = samples.integers(SEAT, -1)
     for k in np.unique(seat[seat >= 0]).tolist():
         rows = set(np.flatnonzero(seat == k).tolist())
         if len(rows - bad) == 1 and len(rows) > 1:
             what = f"the only row of seat {k} when the others are left out"
-            yield Blunder(BlunderKind.LEFT_ALONE, tuple(rows - bad), SEAT, what, AGAIN)
+            yield GrossError(GrossErrorKind.LEFT_ALONE, tuple(rows - bad), SEAT, what, AGAIN)

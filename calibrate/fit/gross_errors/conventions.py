@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from calibrate.fit.gross_errors import joint_hypotheses
 from calibrate.fit.gross_errors.joint_hypotheses import Hypothesis
-from calibrate.model.checks.gross_error import Blunder, BlunderKind
+from calibrate.model.checks.gross_error import GrossError, GrossErrorKind
 from calibrate.model.checks.rough_fit import median
 from calibrate.model.checks.witness import Otherwise, Strain, Witness
 
@@ -51,7 +51,7 @@ class _Account:
     @property
     def reflected(self) -> bool:
         """Whether the readings of a device are mirrored."""
-        return any(one.kind is BlunderKind.MIRRORED_AXIS for one in self.said)
+        return any(one.kind is GrossErrorKind.MIRRORED_AXIS for one in self.said)
 
     @property
     def signs(self) -> tuple[int, ...]:
@@ -64,7 +64,7 @@ class _Account:
         return tuple(
             f"{one.column}: {one.what}"
             for one in self.said
-            if one.kind not in (BlunderKind.JOINT_SIGN, BlunderKind.MIRRORED_AXIS)
+            if one.kind not in (GrossErrorKind.JOINT_SIGN, GrossErrorKind.MIRRORED_AXIS)
         )
 
     @property
@@ -73,7 +73,7 @@ class _Account:
         return sum(max(len(one.signs), 1) if isinstance(one, Hypothesis) else 1 for one in self.said)
 
 
-def wrong_convention(flange: Flange, witnesses: Sequence[Witness]) -> Blunder | None:
+def wrong_convention(flange: Flange, witnesses: Sequence[Witness]) -> GrossError | None:
     """The convention (or two) that explains the readings when those of the rig do not; None if they do.
 
     `flange` maps angles (pose, joint) to (pose, 4, 4) of the nominal arm.
@@ -97,7 +97,7 @@ def wrong_convention(flange: Flange, witnesses: Sequence[Witness]) -> Blunder | 
     return _named(found, tried, before)
 
 
-def wrong_table(flange: Flange, other: Flange, model: str, witnesses: Sequence[Witness]) -> Blunder | None:
+def wrong_table(flange: Flange, other: Flange, model: str, witnesses: Sequence[Witness]) -> GrossError | None:
     """The table of the arm read as `model`, which `other` follows, where that explains the readings and the rig's own
     reading of it does not; None otherwise. Flanges as in `wrong_convention`.
     """
@@ -109,7 +109,7 @@ def wrong_table(flange: Flange, other: Flange, model: str, witnesses: Sequence[W
     figures = f"(misfit {1e3 * after.strain.typical_m:.2g} mm, as written {1e3 * before.strain.typical_m:.3g} mm)"
     what = f"the table follows the other convention of Denavit and Hartenberg, model '{model}' {figures}"
     remedy = f'state model = "{model}" in [arm] of the rig file'
-    return Blunder(BlunderKind.TABLE_CONVENTION, (), "rig file, arm.model", what, remedy)
+    return GrossError(GrossErrorKind.TABLE_CONVENTION, (), "rig file, arm.model", what, remedy)
 
 
 @dataclass(frozen=True)
@@ -200,7 +200,7 @@ def _of_readings(witnesses: tuple[Witness, ...]) -> Iterator[tuple[Otherwise, tu
 
 
 def _mirrors(other: Otherwise) -> bool:
-    return other.kind is BlunderKind.MIRRORED_AXIS
+    return other.kind is GrossErrorKind.MIRRORED_AXIS
 
 
 def _same(one: Otherwise, other: Otherwise) -> bool:
@@ -264,7 +264,7 @@ def _signs_first(search: _Search, found: _Account, tried: list[_Account]) -> tup
     return _simplest(min(equal, key=_compared), equal), [*equal, found]
 
 
-def _named(best: _Account, tried: list[_Account], before: _Account) -> Blunder:
+def _named(best: _Account, tried: list[_Account], before: _Account) -> GrossError:
     """The winner; others that explain the file as well are named in the same message."""
     after_mm, before_mm = 1e3 * best.strain.typical_m, 1e3 * before.strain.typical_m
     figures = f"(misfit {after_mm:.2g} mm, as written {before_mm:.3g} mm)"
@@ -275,7 +275,7 @@ def _named(best: _Account, tried: list[_Account], before: _Account) -> Blunder:
     besides = "".join(f"; and {other.column}: {other.what}" for other in best.said[1:])
     what = f"{first.what}{besides} {figures}{_others(best, tried)}{_mirror_image(best, tried)}"
     remedy = "; and ".join(one.remedy for one in best.said)
-    return Blunder(first.kind, (), first.column, what, remedy)
+    return GrossError(first.kind, (), first.column, what, remedy)
 
 
 def _others(best: _Account, tried: list[_Account]) -> str:
@@ -296,7 +296,7 @@ def _mirror_image(best: _Account, tried: list[_Account]) -> str:
     twin = next((a for a in tried if a.reflected and a.besides == best.besides and _fits_as_well(a, best)), None)
     if twin is None:
         return ""
-    column = next(one.column for one in twin.said if one.kind is BlunderKind.MIRRORED_AXIS).removeprefix("columns ")
+    column = next(one.column for one in twin.said if one.kind is GrossErrorKind.MIRRORED_AXIS).removeprefix("columns ")
     moved_mm, instead_mm = 1e3 * best.strain.moved_m, 1e3 * twin.strain.moved_m
     target = f" (target {instead_mm:.2g} mm off its drawing then, {moved_mm:.2g} mm by the signs)"
     told = "" if _as_good(best, twin) else target

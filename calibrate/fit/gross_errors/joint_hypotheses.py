@@ -17,7 +17,7 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from calibrate.model.checks.gross_error import Blunder, BlunderKind
+from calibrate.model.checks.gross_error import GrossError, GrossErrorKind
 
 Floats = NDArray[np.float64]
 BEYOND = 2.0  # times the farthest joint limit: no arm reads that in radians
@@ -29,7 +29,7 @@ REMEDY = "write radians (degrees times pi/180)"
 class Hypothesis:
     """What the joint angles would have to be."""
 
-    kind: BlunderKind
+    kind: GrossErrorKind
     column: str
     what: str
     remedy: str
@@ -43,7 +43,7 @@ def shifted(n_joints: int) -> Iterator[Hypothesis]:
         for degrees in (90, 180, -90):
             shift = np.where(np.arange(n_joints) == j, np.radians(degrees), 0.0)
             yield Hypothesis(
-                BlunderKind.JOINT_OFFSET,
+                GrossErrorKind.JOINT_OFFSET,
                 f"column q{j + 1}_rad",
                 f"zero of joint {j + 1} is {abs(degrees)}° beside the rig's",
                 f"add {np.radians(degrees):.6f} rad to the column or to theta_offset_rad of joint {j + 1}",
@@ -61,7 +61,7 @@ def coupled(n_joints: int) -> Iterator[Hypothesis]:
             mixing = np.eye(n_joints)
             mixing[j, j - 1] = sign
             yield Hypothesis(
-                BlunderKind.JOINT_COUPLING,
+                GrossErrorKind.JOINT_COUPLING,
                 f"column q{j + 1}_rad",
                 f"joint {j + 1} is coupled with joint {j}: its angle is not counted from link {j}",
                 f"in the rig file, write follows = {{ joint = {j}, by = {sign} }} for joint {j + 1}"
@@ -114,7 +114,7 @@ def _turned(joints: tuple[int, ...], n_joints: int) -> Hypothesis:
     sign = np.where(np.isin(np.arange(1, n_joints + 1), joints), -1.0, 1.0)
     columns, one = ", ".join(f"q{j}_rad" for j in joints), len(joints) == 1
     return Hypothesis(
-        BlunderKind.JOINT_SIGN,
+        GrossErrorKind.JOINT_SIGN,
         f"{'column' if one else 'columns'} {columns}",
         f"{in_words(joints)} {'turns' if one else 'turn'} against the rig's sense",
         f"in the rig file, write sign = -1 for {in_words(joints)}{_makes(joints)}, or remove it there",
@@ -123,7 +123,7 @@ def _turned(joints: tuple[int, ...], n_joints: int) -> Hypothesis:
     )
 
 
-def beyond_limits(q_rad: Floats, limits_rad: Floats) -> Blunder | None:
+def beyond_limits(q_rad: Floats, limits_rad: Floats) -> GrossError | None:
     """Columns whose angles (pose, joint) cannot be radians between limits (joint, 2); None if all can."""
     beyond = _columns(q_rad, limits_rad)
     if len(beyond) == 0:
@@ -132,7 +132,7 @@ def beyond_limits(q_rad: Floats, limits_rad: Floats) -> Blunder | None:
     worst, limit = float(np.max(np.abs(q_rad[:, j]))), float(np.max(np.abs(limits_rad[j])))
     columns = ", ".join(f"q{k + 1}_rad" for k in beyond)
     what = f"angles up to {worst:g} beside a limit of {limit:g} rad (q{j + 1}_rad): these are degrees"
-    return Blunder(BlunderKind.DEGREES, (), f"column {columns}", what, REMEDY)
+    return GrossError(GrossErrorKind.DEGREES, (), f"column {columns}", what, REMEDY)
 
 
 def as_radians(q_rad: Floats, limits_rad: Floats) -> Floats:
@@ -156,7 +156,7 @@ def in_degrees(n_joints: int) -> Iterator[Hypothesis]:
     """All columns in degrees, or one of them: a small motion in degrees can lie within the limits."""
     factor = np.pi / 180.0
     what = "the readings are explained only when the angles are read as degrees"
-    yield Hypothesis(BlunderKind.DEGREES, f"columns q1_rad ... q{n_joints}_rad", what, REMEDY, lambda q: q * factor)
+    yield Hypothesis(GrossErrorKind.DEGREES, f"columns q1_rad ... q{n_joints}_rad", what, REMEDY, lambda q: q * factor)
     for j in range(n_joints):
         scale = np.where(np.arange(n_joints) == j, factor, 1.0)
-        yield Hypothesis(BlunderKind.DEGREES, f"column q{j + 1}_rad", what, REMEDY, lambda q, s=scale: q * s)
+        yield Hypothesis(GrossErrorKind.DEGREES, f"column q{j + 1}_rad", what, REMEDY, lambda q, s=scale: q * s)

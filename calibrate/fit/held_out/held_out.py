@@ -83,11 +83,11 @@ def bootstrap(
     found: list[Floats] = []
     for _ in range(rounds):
         rows = np.concatenate([*(members[i] for i in rng.integers(len(members), size=len(members))), stated])
-        believed = tuple(
+        redrawn = tuple(
             replace(p, start=p.start + rng.normal(0.0, p.prior)) if p.free and np.isfinite(p.prior) else p
             for p in problem.parameters
         )
-        again = by.fit(problem.select(rows).with_parameters(believed), fit.theta)
+        again = by.fit(problem.select(rows).with_parameters(redrawn), fit.theta)
         if again.status is Status.CONVERGED:
             found.append(again.theta)
     return Bootstrap(np.array(found).reshape(-1, len(fit.theta)), rounds - len(found))
@@ -111,7 +111,7 @@ class Proof(Enum):
 
 
 @dataclass(frozen=True)
-class HeldOut:
+class HeldOutRows:
     """Pooled over the folds of a split; numbers are None where there is no proof."""
 
     split: str
@@ -139,7 +139,7 @@ def held_out(
     theta: Floats,
     measure: Callable[[P, Floats], Floats] | None = None,
     by: Estimator = LEAST_SQUARES,
-) -> HeldOut:
+) -> HeldOutRows:
     """Proof by one split from the fit `theta` (param,) of all rows, a start only; refits are made `by` that of the fit.
 
     `measure(problem, theta)` gives errors (any shape) in the unit wanted for `rms`, such as `Problem.misfit`.
@@ -149,13 +149,13 @@ def held_out(
         used = np.setdiff1d(np.arange(problem.rows), unseen)
         fold = _fold(problem, used, unseen, theta, measure, by) if len(used) else Proof.TOO_FEW
         if isinstance(fold, Proof):
-            return HeldOut(split.says, fold, 0, None, None, None, ())
+            return HeldOutRows(split.says, fold, 0, None, None, None, ())
         folds.append(fold)
     dof = sum(fold.dof for fold in folds)
     if dof <= 0:
-        return HeldOut(split.says, Proof.TOO_FEW, 0, None, None, None, ())
+        return HeldOutRows(split.says, Proof.TOO_FEW, 0, None, None, None, ())
     errors = np.concatenate([fold.measured for fold in folds])
-    return HeldOut(
+    return HeldOutRows(
         split.says,
         Proof.DONE,
         sum(len(unseen) for unseen in split.unseen),

@@ -27,7 +27,7 @@ from calibrate.fit.instruments import instruments_of
 from calibrate.fit.joint_problem import JointProblem
 from calibrate.fit.weighting import Weighting
 from calibrate.model.arms.catalogue import arm_of
-from calibrate.model.checks.gross_error import Blunder, BlunderKind, Shots, outlying, robust_scale
+from calibrate.model.checks.gross_error import GrossError, GrossErrorKind, Shots, outlying, robust_scale
 from calibrate.model.checks.witness import thinned
 from calibrate.model.default_tolerance import links_of
 from calibrate.model.parameters import priors, start_values
@@ -48,7 +48,7 @@ UNSEEN = 1e-9  # of the largest singular value, columns scaled: the data do not 
 MOST_BAD = 0.4  # of the rows: beyond, the question is which of two sessions is the right one
 
 
-def mirrored_axes(rig: Rig, samples: Samples) -> Blunder | None:
+def mirrored_axes(rig: Rig, samples: Samples) -> GrossError | None:
     """The axes whose other sign explains the spots when those of the file do not; None if they do, or without spots."""
     if not all(name in samples for name in SPOTS):
         return None
@@ -73,7 +73,7 @@ def mirrored_axes(rig: Rig, samples: Samples) -> Blunder | None:
     what = f"counted the other way round (spots and arm agree to {1e3 * best_m:.2g} mm then, to {1e3 * before_m:.2g} mm"
     rivals = "".join(f"; or {other}" for other in others)
     remedy = "change the sign of the column in all rows"
-    return Blunder(BlunderKind.MIRRORED_AXIS, (), f"column {best}", f"{what} as written){rivals}", remedy)
+    return GrossError(GrossErrorKind.MIRRORED_AXIS, (), f"column {best}", f"{what} as written){rivals}", remedy)
 
 
 def _spots_alone(rig: Rig, samples: Samples) -> Weighting:
@@ -108,13 +108,13 @@ def _columns(signs: tuple[float, ...]) -> str:
     return ", ".join(name for name, sign in zip(SPOTS, signs, strict=True) if sign < 0.0)
 
 
-def clean(weighting: Weighting, start: Floats) -> tuple[Weighting, tuple[Blunder, ...]]:
+def clean(weighting: Weighting, start: Floats) -> tuple[Weighting, tuple[GrossError, ...]]:
     """The rows that can be averaged, and what was wrong with the others.
 
     DataError where so many rows are bad that the rest is no basis.
     """
     rows = np.unique(np.concatenate([m.sample_rows.ravel() for m in weighting.measured]))
-    blunders: list[Blunder] = []
+    blunders: list[GrossError] = []
     kept = weighting
     for _ in range(PASSES):
         found = _found(kept, wary_fit(kept, start))
@@ -126,12 +126,12 @@ def clean(weighting: Weighting, start: Floats) -> tuple[Weighting, tuple[Blunder
     return kept, tuple(blunders)
 
 
-def rows_of(blunders: Sequence[Blunder]) -> NDArray[np.intp]:
+def rows_of(blunders: Sequence[GrossError]) -> NDArray[np.intp]:
     """Every row that any of them names, sorted."""
     return np.array(sorted({row for b in blunders for row in b.rows}), dtype=np.intp)
 
 
-def refuse_most(blunders: tuple[Blunder, ...], rows: int) -> None:
+def refuse_most(blunders: tuple[GrossError, ...], rows: int) -> None:
     """DataError where so many of the rows are named that it is open which ones are the good ones."""
     bad = len(rows_of(blunders))
     if bad > MOST_BAD * rows:
@@ -141,9 +141,9 @@ def refuse_most(blunders: tuple[Blunder, ...], rows: int) -> None:
         )
 
 
-def _found(weighting: Weighting, theta: Floats) -> list[Blunder]:
+def _found(weighting: Weighting, theta: Floats) -> list[GrossError]:
     problem = weighting.problem(theta)
-    out: list[Blunder] = []
+    out: list[GrossError] = []
     every = zip(weighting.measured, distances(problem, theta), strict=False)  # known lengths come last and are no rows
     for index, (measured, distance) in enumerate(every):
         if measured.problem.rows < FEWEST_ROWS:
@@ -162,7 +162,7 @@ def _found(weighting: Weighting, theta: Floats) -> list[Blunder]:
     return out
 
 
-def _beyond_the_arm(blunder: Blunder, shots: Shots) -> bool:
+def _beyond_the_arm(blunder: GrossError, shots: Shots) -> bool:
     """Whether a row is wrong whatever the arm does: where all rows miss by several times the noise, physics is missing
     from the model, and rows that feel most of it are as good as any.
     """
@@ -194,12 +194,12 @@ def _met_exactly(problem: JointProblem, index: int, theta: Floats, measured: Mea
     return met if 2 * met >= rows else 0
 
 
-def _bad_pairs(measured: Measured, distance: Floats, met: int, away_m: Floats) -> list[Blunder]:
+def _bad_pairs(measured: Measured, distance: Floats, met: int, away_m: Floats) -> list[GrossError]:
     """Pairs of rows, of which it is open which one is wrong; (row,) whitened and plain misfit."""
-    out: list[Blunder] = []
+    out: list[GrossError] = []
     for i in np.flatnonzero(outlying(distance, measured.problem.observed.shape[1], met)):
         rows = tuple(sorted(int(r) for r in measured.sample_rows[i]))
         what = f"{measured.name} {1e3 * away_m[i]:.3g} mm away from what all other rows predict"
         remedy = "take both again, or remove them"
-        out.append(Blunder(BlunderKind.BAD_SHOT, rows, ", ".join(columns_of(measured)), what, remedy))
+        out.append(GrossError(GrossErrorKind.BAD_SHOT, rows, ", ".join(columns_of(measured)), what, remedy))
     return out

@@ -71,14 +71,14 @@ def joint_zeros(
     """The zeros among the estimates; posterior covariance (param, param) of `parameters`, zero where one was held."""
     index = {p.name: i for i, p in enumerate(parameters)}
     variance = np.diag(covariance)
-    believed = np.flatnonzero([np.isfinite(p.prior) and variance[i] > 0.0 for i, p in enumerate(parameters)])
+    with_prior = np.flatnonzero([np.isfinite(p.prior) and variance[i] > 0.0 for i, p in enumerate(parameters)])
     found: list[JointZero] = []
     for e in estimates:
         owner, _, what = e.name.partition(".")
         if what != "zero" or not owner.startswith("joint"):  # a second encoder has a zero, too
             continue
         known = e.sigma is not None and bool(np.all(np.isfinite(covariance)))
-        alone = conditional_sigma(covariance, index[e.name], believed) if known else None
+        alone = conditional_sigma(covariance, index[e.name], with_prior) if known else None
         found.append(JointZero(int(owner.removeprefix("joint")), e.value, e.sigma, alone, e.why))
     return tuple(found)
 

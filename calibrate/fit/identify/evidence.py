@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from acquisition.recording import Samples
 from acquisition.recording.rig import Rig
 from acquisition.recording.samples import SEAT, SPOTS
-from calibrate.fit.accuracy import Scatter, Workspace, free_space_error
-from calibrate.fit.held_out.held_out import Bootstrap, HeldOut, Proof, bootstrap, held_out
+from calibrate.fit.accuracy import PoseScatter, Workspace, free_space_error
+from calibrate.fit.held_out.held_out import Bootstrap, HeldOutRows, Proof, bootstrap, held_out
 from calibrate.fit.held_out.splits import (
     Split,
     SplitKind,
@@ -23,11 +23,11 @@ from calibrate.fit.held_out.splits import (
 from calibrate.fit.identify.result import (
     Evidence,
     FreeSpace,
+    HeldOutError,
     Noise,
     Proven,
-    Unseen,
 )
-from calibrate.fit.identify.rounds import Fitted
+from calibrate.fit.identify.rounds import SettledFit
 from calibrate.fit.identify.session import about_of
 from calibrate.fit.joint_problem import JointProblem
 from calibrate.fit.rank.identifiability import Identifiability, analyse
@@ -55,10 +55,10 @@ class Splitting:
     kinds: tuple[SplitKind, ...] = tuple(SplitKind)
 
 
-def proof(fitted: Fitted, before: Fit, splits: tuple[Split, ...]) -> Proven:
+def proof(fitted: SettledFit, before: Fit, splits: tuple[Split, ...]) -> Proven:
     """Both fits predict unseen rows of the joint problem; `before`: the arm held nominal, for the error before."""
     after, drawn = (fitted.problem.with_parameters(fit.parameters) for fit in (fitted.fit, before))
-    found: list[Unseen] = []
+    found: list[HeldOutError] = []
     unproven: list[str] = []
     for split in splits:
         old = held_out(drawn, split, before.theta, _lengths_of_all, fitted.by)
@@ -71,7 +71,7 @@ def proof(fitted: Fitted, before: Fit, splits: tuple[Split, ...]) -> Proven:
     return Proven(tuple(found), tuple(unproven))
 
 
-def splits_of(fitted: Fitted, samples: Samples, splitting: Splitting, rng: Generator) -> tuple[Split, ...]:
+def splits_of(fitted: SettledFit, samples: Samples, splitting: Splitting, rng: Generator) -> tuple[Split, ...]:
     """Splits of the joint problem by rows of these samples: unseen is every observation that an unseen row is part of.
 
     So no row is on both sides. None with too few poses. A known length goes with what only unseen rows know.
@@ -119,7 +119,7 @@ def _lengths_of_all(problem: JointProblem, theta: Floats) -> Floats:
     return np.concatenate([lengths(problem, i, theta) for i in range(len(problem.blocks))])
 
 
-def _with_known_lengths(fitted: Fitted, unseen: Rows) -> Rows:
+def _with_known_lengths(fitted: SettledFit, unseen: Rows) -> Rows:
     """Unseen rows of the joint problem, with the known lengths between places that no row left speaks of."""
     problem, theta = fitted.problem, fitted.fit.theta
     known = np.arange(sum(m.problem.rows for m in fitted.weighting.measured), problem.rows)
@@ -131,20 +131,22 @@ def _with_known_lengths(fitted: Fitted, unseen: Rows) -> Rows:
     return np.concatenate([unseen, known[np.any(theirs[:, silent], axis=1)]])
 
 
-def _by_instrument(fitted: Fitted, split: Split, old: HeldOut, new: HeldOut) -> list[Unseen]:
+def _by_instrument(fitted: SettledFit, split: Split, old: HeldOutRows, new: HeldOutRows) -> list[HeldOutError]:
     rows = np.concatenate(split.unseen)
     before, after = np.concatenate(old.errors), np.concatenate(new.errors)
-    out: list[Unseen] = []
+    out: list[HeldOutError] = []
     for measured, first in zip(fitted.weighting.measured, fitted.problem.first_rows, strict=False):
         own = (rows >= first) & (rows < first + measured.problem.rows)
         if own.any() and new.chi is not None and new.chi_predicted is not None:
             rms = [float(np.sqrt(np.mean(errors[own] ** 2))) for errors in (before, after)]
-            out.append(Unseen(measured.name, split.says, int(own.sum()), rms[0], rms[1], new.chi, new.chi_predicted))
+            out.append(
+                HeldOutError(measured.name, split.says, int(own.sum()), rms[0], rms[1], new.chi, new.chi_predicted)
+            )
     return out
 
 
 @dataclass(frozen=True)
-class Asked:
+class EvidenceOptions:
     """How thorough the proofs are to be; the defaults are what every result gets."""
 
     splitting: Splitting = field(default_factory=Splitting)
@@ -152,13 +154,13 @@ class Asked:
 
 
 def evidence_of(
-    fitted: Fitted,
+    fitted: SettledFit,
     seen: Identifiability,
     before: Fit,
     noise: tuple[Noise, ...],
     rig: Rig,
     samples: Samples,
-    asked: Asked,
+    asked: EvidenceOptions,
     rng: Generator,
 ) -> Evidence:
     """All proofs of a fit. `seen`: at its end; `before`: the nominal arm; `samples`: the whole file."""
@@ -172,7 +174,7 @@ def evidence_of(
     )
 
 
-def rows_used(fitted: Fitted) -> NDArray[np.intp]:
+def rows_used(fitted: SettledFit) -> NDArray[np.intp]:
     """Rows of the samples that took part, sorted."""
     return np.unique(np.concatenate([m.sample_rows.ravel() for m in fitted.weighting.measured]))
 
@@ -185,7 +187,7 @@ def observability_of(problem: JointProblem, theta: Floats, poses: int) -> Observ
 
 
 def free_space_of(
-    fitted: Fitted, seen: Identifiability, noise: tuple[Noise, ...], rig: Rig, rng: Generator
+    fitted: SettledFit, seen: Identifiability, noise: tuple[Noise, ...], rig: Rig, rng: Generator
 ) -> FreeSpace:
     """Over poses drawn evenly between the joint limits: the sigma of the parameters, and a single pose's with it."""
     lower, upper = (np.array([getattr(j, k) for j in rig.arm.joints]) for k in ("lower_rad", "upper_rad"))
@@ -195,19 +197,20 @@ def free_space_of(
     scatter, says = _scatter(noise)
     poses = rng.integers(2**31)  # the same ones for both
     each = [
-        free_space_error(model, fitted.fit, seen, room, np.random.default_rng(poses), s) for s in (Scatter(), scatter)
+        free_space_error(model, fitted.fit, seen, room, np.random.default_rng(poses), s)
+        for s in (PoseScatter(), scatter)
     ]
     return FreeSpace(each[0], each[1], scatter, says, room.poses, (x, y, z))
 
 
-def _scatter(noise: tuple[Noise, ...]) -> tuple[Scatter, str]:
+def _scatter(noise: tuple[Noise, ...]) -> tuple[PoseScatter, str]:
     found = {n.source: n.found for n in noise}
     if JOINT in found:
-        return Scatter(joint_rad=found[JOINT]), OF_JOINTS
-    return Scatter(target_m=max(found.get(source, 0.0) for source in LENGTHS)), OF_INSTRUMENT
+        return PoseScatter(joint_rad=found[JOINT]), OF_JOINTS
+    return PoseScatter(target_m=max(found.get(source, 0.0) for source in LENGTHS)), OF_INSTRUMENT
 
 
-def _bootstrap(fitted: Fitted, rounds: int, rng: Generator) -> Bootstrap | None:
+def _bootstrap(fitted: SettledFit, rounds: int, rng: Generator) -> Bootstrap | None:
     """Observations of one row of the samples are drawn together; known lengths are stated and stay."""
     if rounds == 0:
         return None

@@ -3,7 +3,7 @@
 How far an unseen combination can pull on each parameter: which of its members have a number all the same.
 What the data do not see is known no better than to its plausible size. A parameter that has a share of 1e-4 in it moves
 by 1e-4 of its own plausible size when the combination moves by all of that: it is determined, and what little it is
-pulled goes into its sigma. Where a combination bends (fit/rank/unseen_along.py) the largest pull on its way counts.
+pulled goes into its sigma. Where a combination bends (fit/rank/observability.py) the largest pull on its way counts.
 """
 
 from dataclasses import replace
@@ -30,14 +30,14 @@ from calibrate.fit.identify.estimates import (
     estimate_of,
     untold,
 )
-from calibrate.fit.identify.evidence import Asked, evidence_of, lengths, rows_used
+from calibrate.fit.identify.evidence import EvidenceOptions, evidence_of, lengths, rows_used
 from calibrate.fit.identify.result import (
     FitEnd,
     Identification,
     InstrumentFound,
     Noise,
 )
-from calibrate.fit.identify.rounds import Fitted
+from calibrate.fit.identify.rounds import SettledFit
 from calibrate.fit.identify.session import NEGLIGIBLE_RAD, about_of
 from calibrate.fit.noise.variance import VarianceFactors
 from calibrate.fit.rank.identifiability import STRUCTURAL, WEAK, Identifiability
@@ -45,7 +45,7 @@ from calibrate.fit.rank.observability import analyse_along, points_along
 from calibrate.fit.solvers import FAR_START, Fit, Status
 from calibrate.fit.solvers.least_squares import triangle_of
 from calibrate.fit.weighting import JOINT, Weighting
-from calibrate.model.checks.gross_error import Blunder
+from calibrate.model.checks.gross_error import GrossError
 from calibrate.model.parameters import (
     Parameter,
     hold,
@@ -68,7 +68,13 @@ FAR = 3.0  # plausible sizes that the truth of an unseen combination may lie fro
 
 
 def result_of(
-    fitted: Fitted, blunders: tuple[Blunder, ...], rig: Rig, samples: Samples, *, asked: Asked, rng: Generator
+    fitted: SettledFit,
+    blunders: tuple[GrossError, ...],
+    rig: Rig,
+    samples: Samples,
+    *,
+    asked: EvidenceOptions,
+    rng: Generator,
 ) -> Identification:
     """Everything that travels with the values; `samples` are the whole file, of which the fit took some rows."""
     fit, before = fitted.fit, fit_places_only(fitted)
@@ -106,7 +112,7 @@ def result_of(
     )
 
 
-def fit_places_only(fitted: Fitted) -> Fit:
+def fit_places_only(fitted: SettledFit) -> Fit:
     """The nominal arm, put where the data want it: what there was before the identification."""
     arm = {p.name for m in fitted.weighting.measured for p in m.problem.chain.model.parameters}
     parameters = hold(fitted.fit.parameters, arm)
@@ -114,14 +120,14 @@ def fit_places_only(fitted: Fitted) -> Fit:
     return fitted.by.with_usual_rules.fit(fitted.problem.with_parameters(parameters), start, FAR_START)
 
 
-def _as_stated(fitted: Fitted) -> Fit:
+def _as_stated(fitted: SettledFit) -> Fit:
     """The fit under the noise as assumed, for its chi-square."""
     alone = replace(fitted.weighting, shares=None)  # what encoders know of a row is part of the noise that is stated
     problem = alone.problem(fitted.fit.theta).with_parameters(fitted.fit.parameters)
     return fitted.by.with_usual_rules.fit(problem, fitted.fit.theta)
 
 
-def _estimates(fitted: Fitted, seen: Identifiability) -> tuple[Estimate, ...]:
+def _estimates(fitted: SettledFit, seen: Identifiability) -> tuple[Estimate, ...]:
     fit = fitted.fit
     usable = np.all(np.isfinite(fit.covariance))
     sigma = _widening(fitted) * np.sqrt(np.diag(fit.covariance)) if usable else np.full(len(fit.theta), np.nan)
@@ -145,7 +151,7 @@ def _why_untold(p: Parameter, fit: Fit, i: int, seen: Identifiability, *, told: 
     return None
 
 
-def _widening(fitted: Fitted) -> Floats:
+def _widening(fitted: SettledFit) -> Floats:
     """(param,) factor on sigma that keeps the odds of 3 sigma when the noise is known from few data."""
     parameters = fitted.fit.parameters
     dof = fitted.weighting.doubt(parameters, fitted.fit.theta, fitted.factors)
@@ -156,19 +162,19 @@ def _widening(fitted: Fitted) -> Floats:
 
 def sizes_of_noise(weighting: Weighting, factors: VarianceFactors) -> tuple[Noise, ...]:
     """Every source of noise that was asked for its size: one sigma in m or rad, as assumed and as `factors` have it."""
-    believed = {
+    assumed = {
         source: float(np.median(sigma[sigma > 0.0]))
         for m in reversed(weighting.measured)
         for source, sigma in m.own_sigma.items()
     }
     if weighting.joint_rad > NEGLIGIBLE_RAD:
-        believed[JOINT] = weighting.joint_rad
+        assumed[JOINT] = weighting.joint_rad
     found = {
-        name: Noise(name, believed[name], believed[name] * float(f), believed[name] * float(s), at_zero)
+        name: Noise(name, assumed[name], assumed[name] * float(f), assumed[name] * float(s), at_zero)
         for name, f, s, at_zero in zip(
             weighting.sources, factors.factor, factors.factor_sigma, factors.at_zero, strict=True
         )
-        if name in believed
+        if name in assumed
     }
     if JOINT in found:
         found[JOINT] = _with_shared(found[JOINT], *weighting.shared_rad(factors))
@@ -184,7 +190,7 @@ def _with_shared(joint: Noise, shared_rad: float, sigma_rad: float) -> Noise:
     return replace(joint, found=size, sigma=sigma, at_zero=joint.at_zero and shared_rad < SEEN * sigma_rad)
 
 
-def _found(fitted: Fitted, index: int, before: Floats) -> InstrumentFound:
+def _found(fitted: SettledFit, index: int, before: Floats) -> InstrumentFound:
     measured, problem, theta = fitted.weighting.measured[index], fitted.problem, fitted.fit.theta
     return InstrumentFound(
         measured.name,
@@ -200,7 +206,7 @@ def _rms(values: Floats) -> float:
     return float(np.sqrt(np.mean(values**2)))
 
 
-def _repeats(fitted: Fitted, repeat: Ints | None) -> RepeatNoise | None:
+def _repeats(fitted: SettledFit, repeat: Ints | None) -> RepeatNoise | None:
     if repeat is None:
         return None
     for i, measured in enumerate(fitted.weighting.measured):

@@ -22,7 +22,7 @@ from calibrate.fit.gross_errors.bad_rows import duplicated_rows, left_alone, row
 from calibrate.fit.gross_errors.conventions import wrong_convention, wrong_table
 from calibrate.fit.gross_errors.joint_hypotheses import as_radians, beyond_limits
 from calibrate.fit.identify.clean import clean, mirrored_axes, refuse_most, rows_of
-from calibrate.fit.identify.evidence import Asked, Splitting
+from calibrate.fit.identify.evidence import EvidenceOptions, Splitting
 from calibrate.fit.identify.fit_report import result_of
 from calibrate.fit.identify.point_constraint import point_constraints
 from calibrate.fit.identify.result import Identification
@@ -32,7 +32,7 @@ from calibrate.fit.instruments import Instruments
 from calibrate.fit.solvers.solve import Estimator
 from calibrate.fit.weighting import Weighting
 from calibrate.model.arms.catalogue import arm_of
-from calibrate.model.checks.gross_error import Blunder
+from calibrate.model.checks.gross_error import GrossError
 from calibrate.model.checks.rough_fit import sessions_apart
 from calibrate.model.checks.witness import Witness, by_target
 from calibrate.model.parameters import start_values
@@ -65,7 +65,7 @@ def identify(
     fitted = settled_fit(weighting, coarse_start(weighting, start), plan.of_redundant, by)
     share = plan.share if held_out_share is None else held_out_share
     rounds = plan.bootstrap if bootstrap_rounds is None else bootstrap_rounds
-    asked = Asked(Splitting(share, plan.splits), rounds)
+    asked = EvidenceOptions(Splitting(share, plan.splits), rounds)
     result = result_of(fitted, blunders, rig, samples, asked=asked, rng=rng)
     if plan.method is not BesideName.POINT_CONSTRAINT:
         return result
@@ -75,7 +75,7 @@ def identify(
 
 def without_blunders(
     rig: Rig, samples: Samples, plan: FitPlan = DEFAULT
-) -> tuple[Weighting, Floats, tuple[Blunder, ...]]:
+) -> tuple[Weighting, Floats, tuple[GrossError, ...]]:
     """What can be averaged, a start for it, and what was wrong with the rows left out. DataError as of `identify`."""
     refuse_wrong_file(rig, samples)
     early = _with_left_alone(samples, (*impossible_rows(rig, samples), *_sessions_apart(rig, samples)))
@@ -113,7 +113,7 @@ def _refuse_positions(instruments: Instruments) -> None:
     )
 
 
-def wrong_file(rig: Rig, samples: Samples) -> tuple[Blunder, ...]:
+def wrong_file(rig: Rig, samples: Samples) -> tuple[GrossError, ...]:
     """Conventions of the whole file that are not those of the rig."""
     q_rad, limits_rad = samples.joints(), _limits_rad(rig)
     in_degrees = beyond_limits(q_rad, limits_rad)
@@ -126,7 +126,7 @@ def wrong_file(rig: Rig, samples: Samples) -> tuple[Blunder, ...]:
     return tuple(blunder for blunder in (in_degrees, found) if blunder is not None)
 
 
-def _wrong_table(rig: Rig, witnesses: Sequence[Witness]) -> Blunder | None:
+def _wrong_table(rig: Rig, witnesses: Sequence[Witness]) -> GrossError | None:
     """The two ways to write a Denavit-Hartenberg table, which a data sheet hardly ever names."""
     if (other := CONFUSED.get(rig.arm.model)) is None:
         return None
@@ -134,12 +134,12 @@ def _wrong_table(rig: Rig, witnesses: Sequence[Witness]) -> Blunder | None:
     return wrong_table(_drawn_flange(rig), _drawn_flange(by_other), other.value, witnesses)
 
 
-def impossible_rows(rig: Rig, samples: Samples) -> tuple[Blunder, ...]:
+def impossible_rows(rig: Rig, samples: Samples) -> tuple[GrossError, ...]:
     """Rows that no instrument has to judge: copies, angles that the arm cannot have, and what shows nothing without."""
     return _with_left_alone(samples, duplicated_rows(samples) + rows_beyond_limits(samples, _limits_rad(rig)))
 
 
-def _with_left_alone(samples: Samples, blunders: tuple[Blunder, ...]) -> tuple[Blunder, ...]:
+def _with_left_alone(samples: Samples, blunders: tuple[GrossError, ...]) -> tuple[GrossError, ...]:
     return blunders + left_alone(samples, blunders)
 
 
@@ -147,7 +147,7 @@ def _limits_rad(rig: Rig) -> Floats:
     return np.array([[j.lower_rad, j.upper_rad] for j in rig.arm.joints])
 
 
-def _sessions_apart(rig: Rig, samples: Samples) -> tuple[Blunder, ...]:
+def _sessions_apart(rig: Rig, samples: Samples) -> tuple[GrossError, ...]:
     if POSITION[0] not in samples:
         return ()
     rows, positions = _positions(samples)
@@ -160,7 +160,7 @@ def _sessions_apart(rig: Rig, samples: Samples) -> tuple[Blunder, ...]:
     )
 
 
-def _instruments_without(rig: Rig, samples: Samples, blunders: tuple[Blunder, ...], plan: FitPlan) -> Instruments:
+def _instruments_without(rig: Rig, samples: Samples, blunders: tuple[GrossError, ...], plan: FitPlan) -> Instruments:
     """The instruments without the rows of these gross errors; their rows count in the samples as given."""
     if not blunders:
         return instruments_for_fit(rig, samples, plan)

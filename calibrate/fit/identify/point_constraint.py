@@ -45,7 +45,7 @@ SAME_POSE_RAD = 0.01  # repeats of one pose are one pose
 TOLERANCE = 1e-12  # of chi2
 
 
-class Form(Enum):
+class Constraint(Enum):
     """What is made small."""
 
     PAIR_POINTS = "nearest points of the pairs (1,3) (1,4) (2,3) (2,4) less their mean"
@@ -91,7 +91,7 @@ class PointConstraint:
     q_rad: Floats  # (pose, joint)
     first_psd: NDArray[np.int64]  # (pose,)
     line_m: float  # whitens the residuals
-    form: Form
+    form: Constraint
     parameters: tuple[Parameter, ...]
 
     def residual(self, theta: Floats) -> Floats:
@@ -124,7 +124,7 @@ class PointConstraint:
     def _residual(self, theta: Floats) -> tuple[Floats, Floats]:
         lines = self.lines(theta)
         return self._in_first_flange(
-            theta, *(self._pairs(lines) if self.form is Form.PAIR_POINTS else distances(lines))
+            theta, *(self._pairs(lines) if self.form is Constraint.PAIR_POINTS else distances(lines))
         )
 
     def _pairs(self, lines: Lines) -> tuple[Floats, Floats]:
@@ -216,7 +216,7 @@ def identify_by_four_poses(
     _refuse_unfit(data)
     if len(data) != 4:
         raise DataError(f"four-pose point constraint: {len(data)} poses given; choose two of each order")
-    return _identify(model, mount, data, doubt, Form.PAIR_POINTS)
+    return _identify(model, mount, data, doubt, Constraint.PAIR_POINTS)
 
 
 def identify_by_point(
@@ -224,11 +224,11 @@ def identify_by_point(
 ) -> PointConstraintResult:
     """Zeros from four or more centred poses of both orders at one placement. DataError where the poses are not such."""
     _refuse_unfit(data)
-    return _identify(model, mount, data, doubt, Form.NEAREST_POINT)
+    return _identify(model, mount, data, doubt, Constraint.NEAREST_POINT)
 
 
 def _identify(
-    model: KinematicModel, mount: LaserMount, data: Observations, doubt: DrawingDoubt, form: Form
+    model: KinematicModel, mount: LaserMount, data: Observations, doubt: DrawingDoubt, form: Constraint
 ) -> PointConstraintResult:
     parameters = tuple(_bounded(p) for p in model.parameters + mount.parameters)
     problem = PointConstraint(model, mount, data.q_rad, data.first_psd, doubt.line_m, form, parameters)

@@ -13,20 +13,20 @@ from calibrate.fit.identify.estimates import Estimate
 from calibrate.fit.identify.result import Evidence, FitEnd, FreeSpace, Identification, Noise
 from calibrate.fit.rank.identifiability import Identifiability
 from calibrate.fit.rank.observability import Observability
-from calibrate.model.checks.gross_error import Blunder
+from calibrate.model.checks.gross_error import GrossError
 from calibrate.model.model_file import (
     WITH_PHYSICS,
     BootstrapRecord,
     Fields,
     FitRecord,
-    FreeSpaceRecord,
     LeftOut,
     ModelFile,
     ModelParameter,
     ObservabilityRecord,
     RigIdentity,
-    Unseen,
+    UnseenRecord,
     UnseenRows,
+    WorkspaceErrorRecord,
     covariance_record,
     fields_of,
 )
@@ -43,7 +43,7 @@ class EvidenceFields(TypedDict):
     proofs: tuple[UnseenRows, ...]
     unproven: tuple[str, ...]
     observability: ObservabilityRecord | None
-    free_space: FreeSpaceRecord | None
+    free_space: WorkspaceErrorRecord | None
     bootstrap: BootstrapRecord | None
     left_m: float
 
@@ -105,9 +105,9 @@ def _observability(shown: Observability) -> ObservabilityRecord:
     return ObservabilityRecord(shown.o1, shown.o2, shown.o3, shown.o4, shown.o5, condition, shown.n_free)
 
 
-def _free_space(room: FreeSpace) -> FreeSpaceRecord:
+def _free_space(room: FreeSpace) -> WorkspaceErrorRecord:
     one, pose = room.geometry, room.pose
-    return FreeSpaceRecord(
+    return WorkspaceErrorRecord(
         one.status.name,
         one.status.value,
         one.rms_m,
@@ -140,7 +140,7 @@ def record_of(result: Identification, rig: RigIdentity, arm_model: str, plan: st
         free=seen.n_free,
         condition=seen.condition if np.isfinite(seen.condition) else None,
         singular_values=tuple(seen.singular_values.tolist()),
-        unseen=tuple(Unseen(c.words, c.members, c.structural) for c in seen.combinations),
+        unseen=tuple(UnseenRecord(c.words, c.members, c.structural) for c in seen.combinations),
         parameters=parameter_records(result.estimates, seen, result.evidence.bootstrap),
         chain={p.name: float(v) for p, v in zip(result.parameters, result.theta, strict=True)},
         covariance=covariance_record(result.parameters, result.covariance),
@@ -208,6 +208,6 @@ def _plain(fields: Fields) -> Fields:
     return {k: getattr(v, "name", v) for k, v in fields.items()}
 
 
-def left_out(blunder: Blunder) -> LeftOut:
+def left_out(blunder: GrossError) -> LeftOut:
     """With rows counted from 1, as a person counts."""
     return LeftOut(blunder.kind.name, tuple(row + 1 for row in blunder.rows), blunder.column, blunder.says)

@@ -10,7 +10,7 @@ from math import sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from calibrate.fit.accuracy import Alarm, FreeSpaceError, RepeatNoise, Scatter, StatedNoise
+from calibrate.fit.accuracy import Alarm, FreeSpaceError, PoseScatter, RepeatNoise, StatedNoise
 from calibrate.fit.held_out.held_out import Bootstrap
 from calibrate.fit.identify.estimates import Estimate, JointZero, joint_zeros
 from calibrate.fit.identify.point_constraint import PointConstraints
@@ -22,7 +22,7 @@ from calibrate.fit.solvers import (
     Status,
     Stop,
 )
-from calibrate.model.checks.gross_error import Blunder
+from calibrate.model.checks.gross_error import GrossError
 from calibrate.model.parameters import Parameter
 from calibrate.model.sensors.catalogue import kind_of, names_with
 from calibrate.model.sensors.kind import Trait
@@ -72,7 +72,7 @@ class InstrumentFound:
 
 
 @dataclass(frozen=True)
-class Unseen:
+class HeldOutError:
     """Error of one instrument on observations that the fit has not seen; distances as in InstrumentFound."""
 
     name: str
@@ -88,7 +88,7 @@ class Unseen:
 class Proven:
     """Errors of every instrument under every split, and why a split proves nothing."""
 
-    held_out: tuple[Unseen, ...] = ()
+    held_out: tuple[HeldOutError, ...] = ()
     unproven: tuple[str, ...] = ()
 
 
@@ -98,7 +98,7 @@ class FreeSpace:
 
     geometry: FreeSpaceError  # the uncertainty of the parameters alone: what the next calibration could take away
     pose: FreeSpaceError  # with the scatter of a single pose: what a user meets
-    scatter: Scatter
+    scatter: PoseScatter
     scatter_says: str  # what the scatter is made of
     poses: int
     point_m: tuple[float, float, float]  # the target in the flange frame
@@ -130,7 +130,7 @@ class Identification:
     """Outcome of the identification of an arm by any instruments."""
 
     status: Status
-    blunders: tuple[Blunder, ...]  # their rows took no part
+    blunders: tuple[GrossError, ...]  # their rows took no part
     estimates: tuple[Estimate, ...]  # of all parameters, in order
     identifiability: Identifiability
     instruments: tuple[InstrumentFound, ...]
@@ -154,7 +154,7 @@ class Identification:
         return joint_zeros(self.estimates, self.parameters, self.covariance)
 
     @property
-    def held_out(self) -> tuple[Unseen, ...]:
+    def held_out(self) -> tuple[HeldOutError, ...]:
         """One an instrument and split; empty with too few observations."""
         return self.evidence.proven.held_out
 

@@ -38,7 +38,7 @@ LEAST_SCALE = 1e-6  # of the assumed noise: perfect data have a scale, too
 
 
 @dataclass(frozen=True)
-class Fitted:
+class SettledFit:
     """A fit under its weights; `seen` at its end, before anything redundant was held."""
 
     weighting: Weighting
@@ -52,7 +52,7 @@ class Fitted:
 
 def settled_fit(
     weighting: Weighting, start: Floats, redundant: Redundant = Redundant.REMOVED, by: Estimator = LEAST_SQUARES
-) -> Fitted:
+) -> SettledFit:
     """Rounds from `start` (param,) until weights and rank stand."""
     fitted = _round(weighting, weighting.believed, start, FAR_START, redundant, by)
     steps = fitted.fit.steps
@@ -84,9 +84,9 @@ def coarse_start(weighting: Weighting, start: Floats) -> Floats:
     has a prior, or where the fit is not finite.
     """
     problem = weighting.problem(start)
-    believed = {p.name for p in problem.parameters if p.free and np.isfinite(p.prior)}
-    rest = problem.with_parameters(hold(problem.parameters, believed))
-    if not believed or not any(p.free for p in rest.parameters):
+    with_prior = {p.name for p in problem.parameters if p.free and np.isfinite(p.prior)}
+    rest = problem.with_parameters(hold(problem.parameters, with_prior))
+    if not with_prior or not any(p.free for p in rest.parameters):
         return start
     seen = analyse(rest.fulfilled(start).jacobian(start), rest.parameters)
     fit = solve(rest.with_parameters(reduced(rest.parameters, seen)), start=start, tolerance=COARSE)
@@ -120,10 +120,10 @@ def _round(
     damping: float,
     redundant: Redundant,
     by: Estimator = LEAST_SQUARES,
-) -> Fitted:
+) -> SettledFit:
     problem = weighting.problem(start, factors)
     fit, seen = _solved(problem, start, damping, redundant, by)
-    return Fitted(weighting, problem, fit, seen, factors, fit.steps, by)
+    return SettledFit(weighting, problem, fit, seen, factors, fit.steps, by)
 
 
 def _solved(

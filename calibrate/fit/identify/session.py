@@ -79,11 +79,11 @@ def as_planned(found: Instruments, plan: FitPlan) -> Instruments:
     parameters = found.weighting.parameters
     for pattern in (*plan.free, *plan.priors, *plan.hold):
         _refuse_idle(pattern, [p.name for p in parameters])
-    chosen = tuple(_believed(p, plan) for p in parameters)
+    chosen = tuple(_with_prior_of(p, plan) for p in parameters)
     return found if chosen == parameters else replace(found, weighting=replace(found.weighting, chosen=chosen))
 
 
-def _believed(p: Parameter, plan: FitPlan) -> Parameter:
+def _with_prior_of(p: Parameter, plan: FitPlan) -> Parameter:
     if _matches(p.name, plan.free):
         plausible = max(p.plausible, LINK_PLAUSIBLE) if p.name.startswith("link") else p.plausible
         p = replace(p, free=True, prior=np.inf, plausible=plausible, assumed=False)
@@ -111,7 +111,7 @@ def _listed(names: Iterable[str]) -> str:
 def instruments_for_fit(rig: Rig, samples: Samples, plan: FitPlan = DEFAULT) -> Instruments:
     """The instruments of the samples, as planned; links have the drawing tolerance for a prior.
 
-    Without one they are free, but where there are spots, which see little of an arm: as default_belief.py.
+    Without one they are free, but where there are spots, which see little of an arm: as default_tolerance.py.
 
     DataError where no row holds an observation, or where columns, rig and plan contradict each other.
     """
@@ -143,7 +143,7 @@ def columns_of(measured: Measured) -> tuple[str, ...]:
     return measured.problem.chain.sensor.own_columns() or kind_of(measured.name).columns
 
 
-def believed_sigma(measured: Measured) -> Floats:
+def assumed_sigma(measured: Measured) -> Floats:
     """(row, k) the instrument's own noise as assumed, all its sources together."""
     return np.sqrt(sum((sigma**2 for sigma in measured.own_sigma.values()), np.zeros(measured.problem.observed.shape)))
 
@@ -160,7 +160,7 @@ def shots_of(measured: Measured, theta: Floats) -> Shots | None:
     def expect(observations: Indices, q_rad: Floats) -> Floats:
         return chain.select(observations).expect(theta, q_rad)
 
-    sigma = np.median(believed_sigma(measured), axis=0)
+    sigma = np.median(assumed_sigma(measured), axis=0)
     rows = measured.sample_rows[:, 0]
     return Shots(rows, columns_of(measured), problem.q_rad, problem.observed, sigma, expect)
 

@@ -13,15 +13,15 @@ from calibrate.fit.noise.scatter import (
     sigma_about_zero,
     witness_of,
 )
-from calibrate.fit.noise.variance import TOLD, VarianceFactors, as_believed
+from calibrate.fit.noise.variance import SEPARABLE, VarianceFactors, as_assumed
 
 __all__ = [
     "NU",
-    "TOLD",
+    "SEPARABLE",
     "Scatter",
     "SharedScatter",
     "VarianceFactors",
-    "as_believed",
+    "as_assumed",
     "levers_of",
     "likelihood_of",
     "scatter_of",

@@ -224,8 +224,8 @@ def score_at(
 
 def _of_one(L: Floats, prior_information: Floats) -> Floats:
     """(param, param) Z'Z of a single instrument, by L L' = Y'Y + priors."""
-    believed = _divided(np.diag(np.sqrt(prior_information)), L)
-    return np.eye(len(L)) - believed.T @ believed
+    of_priors = _divided(np.diag(np.sqrt(prior_information)), L)
+    return np.eye(len(L)) - of_priors.T @ of_priors
 
 
 def _whitened(rows: NoisyRows | IndependentRows, log_variance: Floats) -> _Shares | _BlockShares:

@@ -22,14 +22,14 @@ from calibrate.fit.noise.restricted_likelihood import (
     score_at,
 )
 
-__all__ = ["FIXED", "NoisyRows", "VarianceFactors", "as_believed", "covariance_of", "doubt", "estimate"]
+__all__ = ["FIXED", "NoisyRows", "VarianceFactors", "as_assumed", "covariance_of", "doubt", "estimate"]
 
 Floats = NDArray[np.float64]
 
 LOG_VARIANCE_PRIOR = 2.0 * np.log(4.0)  # assumed noise is often wrong by 1.5 to 8 times: one sigma is a factor 4
 STEP_LIMIT = 1.5  # of the log variance in one step
 MAX_STEPS = 30
-TOLD = 2.0  # of its own sigmas: a smaller variance cannot be separated from none
+SEPARABLE = 2.0  # of its own sigmas: a smaller variance cannot be separated from none
 TOLERANCE = 2e-3  # of the log variance in a last step of Newton's; a quarter of its square is left: 1e-6 of a sigma
 
 
@@ -53,7 +53,7 @@ class VarianceFactors:
         return self.factor * np.sqrt(np.diag(self.covariance)) / 2.0
 
 
-def as_believed(sources: int) -> VarianceFactors:
+def as_assumed(sources: int) -> VarianceFactors:
     """Every source as large as assumed, and as uncertain."""
     return VarianceFactors(
         np.zeros(sources), LOG_VARIANCE_PRIOR**2 * np.eye(sources), converged=True, at_zero=(False,) * sources
@@ -98,10 +98,10 @@ def _step(score: Score, log_variance: Floats) -> tuple[Floats, bool]:
 
     Else by scoring, which knows no curvature of a source with a small share, and would jump across the end for ever.
     """
-    belief = np.eye(len(log_variance)) / LOG_VARIANCE_PRIOR**2
-    newton = _positive(score.observed + belief)
-    information = (score.observed if newton else score.expected) + belief
-    step = np.linalg.solve(information, score.gradient - belief @ log_variance)
+    by_prior = np.eye(len(log_variance)) / LOG_VARIANCE_PRIOR**2
+    newton = _positive(score.observed + by_prior)
+    information = (score.observed if newton else score.expected) + by_prior
+    step = np.linalg.solve(information, score.gradient - by_prior @ log_variance)
     return np.clip(step, -STEP_LIMIT, STEP_LIMIT), newton
 
 
@@ -114,8 +114,8 @@ def _positive(symmetric: Floats) -> bool:
 
 
 def _found(score: Score, log_variance: Floats, *, converged: bool) -> VarianceFactors:
-    """At zero: smaller than assumed, and by the data fewer than `TOLD` of its sigmas above none."""
-    belief = 1.0 / LOG_VARIANCE_PRIOR**2
-    covariance = np.asarray(np.linalg.inv(score.expected + belief * np.eye(len(log_variance))), dtype=np.float64)
-    unseen = (np.diag(score.expected) < TOLD**2) & (log_variance < 0.0)
+    """At zero: smaller than assumed, and by the data fewer than `SEPARABLE` of its sigmas above none."""
+    by_prior = 1.0 / LOG_VARIANCE_PRIOR**2
+    covariance = np.asarray(np.linalg.inv(score.expected + by_prior * np.eye(len(log_variance))), dtype=np.float64)
+    unseen = (np.diag(score.expected) < SEPARABLE**2) & (log_variance < 0.0)
     return VarianceFactors(log_variance, covariance, converged, tuple(unseen.tolist()))

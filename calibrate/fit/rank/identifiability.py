@@ -112,16 +112,16 @@ def analyse(jacobian: Floats, parameters: tuple[Parameter, ...]) -> Identifiabil
     )
 
 
-def directions(jacobian: Floats, belief: Floats) -> tuple[Floats, Floats]:
+def directions(jacobian: Floats, one_over_prior: Floats) -> tuple[Floats, Floats]:
     """Singular values (free,), falling, and their directions (free, free), row by row, of data and priors.
 
     For the scaled whitened Jacobian (row, free) and the plausible sizes over the prior sigmas (free,).
     """
-    n = len(belief)
-    believed = np.flatnonzero(belief)
-    beliefs = np.zeros((max(len(believed), n - len(jacobian)), n))  # at least as many rows as columns
-    beliefs[range(len(believed)), believed] = belief[believed]
-    rows = np.concatenate([jacobian, beliefs])
+    n = len(one_over_prior)
+    with_prior = np.flatnonzero(one_over_prior)
+    prior_rows = np.zeros((max(len(with_prior), n - len(jacobian)), n))  # at least as many rows as columns
+    prior_rows[range(len(with_prior)), with_prior] = one_over_prior[with_prior]
+    rows = np.concatenate([jacobian, prior_rows])
     _, s, Vt = np.linalg.svd(triangle_of(rows))  # the triangle has the same values and directions
     return s, Vt
 

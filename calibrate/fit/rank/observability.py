@@ -147,7 +147,7 @@ def reduced(
     return tuple(replace(p, prior=min(p.prior, p.plausible)) if p.name in members else p for p in parameters)
 
 
-class Together(Protocol):
+class Inseparable(Protocol):
     """Parameters that can only be determined together: a combination of the analysis, or of a model.json."""
 
     @property
@@ -165,7 +165,7 @@ def plain_reason(name: str, seen: Identifiability, fallback: str | None) -> str:
     return reason_among(name, seen.combinations, fallback)
 
 
-def reason_among(name: str, combinations: Sequence[Together], fallback: str | None) -> str:
+def reason_among(name: str, combinations: Sequence[Inseparable], fallback: str | None) -> str:
     """The same from the combinations alone."""
     for combination in combinations:
         if name in combination.members:
@@ -173,7 +173,7 @@ def reason_among(name: str, combinations: Sequence[Together], fallback: str | No
     return fallback or "not determined"
 
 
-def kind_of(combination: Together) -> str:
+def kind_of(combination: Inseparable) -> str:
     """Why nothing separates its members."""
     if len(combination.members) == 1:
         return "the measurement does not depend on it"
@@ -187,7 +187,7 @@ def in_plain_words(words: str) -> str:
     return " and ".join(_plain(part) for part in words.split(" + "))
 
 
-def _says(name: str, combination: Together) -> str:
+def _says(name: str, combination: Inseparable) -> str:
     if len(combination.members) == 1:
         return "the measurement does not depend on it"
     others = combination.words.split(" + ")

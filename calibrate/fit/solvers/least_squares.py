@@ -151,7 +151,7 @@ class Fit:
 
 
 @dataclass(frozen=True)
-class Rows:
+class WeightedRows:
     """LeastSquares with its priors as rows; parameters enter by their free ones only, in units of `scale`."""
 
     problem: LeastSquares
@@ -159,29 +159,29 @@ class Rows:
     scale: Floats  # (free,) plausible sizes
     centre: Floats  # (prior,) where priors pull to
     prior: Floats  # (prior,) their sigmas
-    believed: NDArray[np.intp]  # among the free ones
+    with_prior: NDArray[np.intp]  # among the free ones
     lower: Floats  # (free,)
     upper: Floats
     root_weight: Floats | None = None  # (row,) on the data rows; None: all 1
 
     @classmethod
-    def of(cls, problem: LeastSquares) -> "Rows":
+    def of(cls, problem: LeastSquares) -> "WeightedRows":
         parameters = problem.parameters
         free = np.flatnonzero([p.free for p in parameters])
         prior, centre = priors(parameters)[free], start_values(parameters)[free]
-        believed = np.flatnonzero(np.isfinite(prior))
+        with_prior = np.flatnonzero(np.isfinite(prior))
         return cls(
             problem,
             free,
             plausible_sizes(parameters)[free],
-            centre[believed],
-            prior[believed],
-            believed,
+            centre[with_prior],
+            prior[with_prior],
+            with_prior,
             np.array([p.lower for p in parameters])[free],
             np.array([p.upper for p in parameters])[free],
         )
 
-    def weighted(self, weights: Floats) -> "Rows":
+    def weighted(self, weights: Floats) -> "WeightedRows":
         """The same with weights (row,) on the squares of the data rows."""
         return replace(self, root_weight=np.sqrt(weights))
 
@@ -190,18 +190,18 @@ class Rows:
         data = self.problem.residual(theta)
         if self.root_weight is not None:
             data = self.root_weight * data
-        return np.concatenate([data, (theta[self.free][self.believed] - self.centre) / self.prior])
+        return np.concatenate([data, (theta[self.free][self.with_prior] - self.centre) / self.prior])
 
     def jacobian(self, theta: Floats) -> Floats:
         """(row + prior, free) by the scaled free parameters."""
         data = self.problem.jacobian(theta)
-        out = np.zeros((len(data) + len(self.believed), len(self.free)))
-        rows, beliefs = out[: len(data)], out[len(data) :]
+        out = np.zeros((len(data) + len(self.with_prior), len(self.free)))
+        rows, prior_rows = out[: len(data)], out[len(data) :]
         np.take(data, self.free, axis=1, out=rows, mode="clip")
         rows *= self.scale
         if self.root_weight is not None:
             rows *= self.root_weight[:, None]
-        beliefs[range(len(self.believed)), self.believed] = self.scale[self.believed] / self.prior
+        prior_rows[range(len(self.with_prior)), self.with_prior] = self.scale[self.with_prior] / self.prior
         return out
 
     def scaled(self, theta: Floats) -> Floats:
@@ -231,7 +231,7 @@ class Rows:
 
 @dataclass(frozen=True)
 class Ended:
-    """Where an algorithm came to rest; residual and slope are those of `Rows` at `theta`."""
+    """Where an algorithm came to rest; residual and slope are those of `WeightedRows` at `theta`."""
 
     theta: Floats
     residual: Floats

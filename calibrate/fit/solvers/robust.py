@@ -27,14 +27,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtrc, chdtri
 
-from calibrate.fit.solvers.least_squares import Ended, Rows, Stop, covariance_of, promised_gain
+from calibrate.fit.solvers.least_squares import Ended, Stop, WeightedRows, covariance_of, promised_gain
 from calibrate.fit.solvers.trust_region import least_gain
 from calibrate.model.problem import LeastSquares
 
 Floats = NDArray[np.float64]
 Widths = NDArray[np.intp]
 SINGLE = np.ones(1, dtype=np.intp)
-Run = Callable[[Rows, Floats], Ended]
+Run = Callable[[WeightedRows, Floats], Ended]
 MAX_ROUNDS = 200  # of weights; each shrinks the way to go by the share of distrusted rows, usually 2 to 10 times
 
 
@@ -124,7 +124,7 @@ Loss.CAUCHY = Loss(LossKind.CAUCHY, 2.385)
 Loss.STUDENT_T = Loss.student_t(4.0)  # Lange et al.: 4 served well where nu was not estimated
 
 
-def reweighted(rows: Rows, theta: Floats, loss: Loss, run: Run, tolerance: float) -> Ended:
+def reweighted(rows: WeightedRows, theta: Floats, loss: Loss, run: Run, tolerance: float) -> Ended:
     """Minimum of the loss from theta (param,) by rounds of `run`; losses that bend back start at Huber's answer.
 
     Residual and slope of the answer are those of the last weights.
@@ -145,7 +145,7 @@ def reweighted(rows: Rows, theta: Floats, loss: Loss, run: Run, tolerance: float
     return replace(ended, steps=steps, stop=Stop.ROUNDS)
 
 
-def _settled(rows: Rows, theta: Floats, loss: Loss, tolerance: float) -> bool:
+def _settled(rows: WeightedRows, theta: Floats, loss: Loss, tolerance: float) -> bool:
     """Under the weights of its own residuals, a full step from here promises less than the tolerance."""
     weighted = rows.weighted(row_weights(rows.problem, rows.problem.residual(theta), loss))
     residual, slope = weighted.residual(theta), weighted.jacobian(theta)
@@ -167,7 +167,7 @@ def total_cost(problem: LeastSquares, residual: Floats, loss: Loss) -> float:
     return float(np.sum(loss.cost(groups.norms(residual), groups.widths)))
 
 
-def robust_covariance(rows: Rows, theta: Floats, loss: Loss) -> Floats | None:
+def robust_covariance(rows: WeightedRows, theta: Floats, loss: Loss) -> Floats | None:
     """(free, free) in scaled columns: A^-1 B A^-1; None where it does not exist.
 
     An observation bends by its curvature in one direction and by its weight in the k - 1 across; the directions of

@@ -9,7 +9,7 @@ from enum import Enum
 import numpy as np
 from numpy.typing import NDArray
 
-from calibrate.fit.solvers.least_squares import Ended, Fit, Rows, Status, Stop, covariance_of, promised_gain
+from calibrate.fit.solvers.least_squares import Ended, Fit, Status, Stop, WeightedRows, covariance_of, promised_gain
 from calibrate.fit.solvers.robust import (
     Loss,
     LossKind,
@@ -53,7 +53,7 @@ def solve(
     aside if given. `tolerance`: converged when a full step promises less than this of chi2 (noise is 1, so 1e-8 means
     1e-4 sigma), or less than 1e-4 of it times chi2; Dog-Leg has its own rules and uses it between rounds of weights.
     """
-    rows = Rows.of(problem)
+    rows = WeightedRows.of(problem)
     theta = rows.moved(start_values(problem.parameters) if start is None else start, np.zeros(len(rows.free)))
     run = _run(method, LevenbergRules(damping, max_steps, tolerance), rules or DogLegRules(kmax=max_steps))
     robust = loss.kind is not LossKind.SQUARE
@@ -67,11 +67,11 @@ def _run(method: Method, levenberg_rules: LevenbergRules, dogleg_rules: DogLegRu
     return lambda rows, theta: levenberg(rows, theta, levenberg_rules)
 
 
-def _fit(rows: Rows, ended: Ended, loss: Loss, tolerance: float, *, covariance: bool) -> Fit:
+def _fit(rows: WeightedRows, ended: Ended, loss: Loss, tolerance: float, *, covariance: bool) -> Fit:
     parameters, theta = rows.problem.parameters, ended.theta
     robust = loss.kind is not LossKind.SQUARE
     plain = rows.residual(theta) if robust else ended.residual
-    data, beliefs = plain[: len(plain) - len(rows.believed)], plain[len(plain) - len(rows.believed) :]
+    data, prior_rows = plain[: len(plain) - len(rows.with_prior)], plain[len(plain) - len(rows.with_prior) :]
     chi2 = float(plain @ plain)
     scaled = None
     if covariance and ended.slope is not None:
@@ -87,12 +87,12 @@ def _fit(rows: Rows, ended: Ended, loss: Loss, tolerance: float, *, covariance: 
         ended.steps,
         at_bound if ended.slope is not None else (),
         ended.stop,
-        float(total_cost(rows.problem, data, loss) + beliefs @ beliefs) if robust else chi2,
+        float(total_cost(rows.problem, data, loss) + prior_rows @ prior_rows) if robust else chi2,
         row_weights(rows.problem, data, loss) if robust else None,
     )
 
 
-def _in_full(rows: Rows, scaled: Floats | None) -> Floats:
+def _in_full(rows: WeightedRows, scaled: Floats | None) -> Floats:
     """(param, param) covariance from that of the scaled free parameters."""
     n = len(rows.problem.parameters)
     if scaled is None:
@@ -102,7 +102,7 @@ def _in_full(rows: Rows, scaled: Floats | None) -> Floats:
     return out
 
 
-def _status(rows: Rows, ended: Ended, dependent: bool, bounded: bool, tolerance: float) -> Status:
+def _status(rows: WeightedRows, ended: Ended, dependent: bool, bounded: bool, tolerance: float) -> Status:
     if ended.stop is Stop.NOT_FINITE or ended.slope is None:
         return Status.NOT_FINITE
     if ended.stop in (Stop.STEPS, Stop.ROUNDS):
@@ -115,7 +115,7 @@ def _status(rows: Rows, ended: Ended, dependent: bool, bounded: bool, tolerance:
     return Status.AT_BOUND if bounded else Status.CONVERGED
 
 
-def _left_to_gain(rows: Rows, ended: Ended, slope: Floats) -> float:
+def _left_to_gain(rows: WeightedRows, ended: Ended, slope: Floats) -> float:
     """What a full step still promises of chi2, less what rounding may make of it."""
     gradient = slope.T @ ended.residual
     active = ~rows.pressed(ended.theta, gradient)

@@ -12,7 +12,7 @@ Sethna, Improvements to the Levenberg-Marquardt algorithm, 2012, arXiv:1201.5885
 Powell's Dog-Leg: within a trust radius, from steepest descent to the Gauss-Newton step along two straight legs.
 Sources: Powell, in Rabinowitz (ed.), Numerical Methods for Nonlinear Algebraic Equations, 1970; stopping rules,
 radius and acceptance as in patent CN114523474B (Lu, Shi), step 6. Added to it: where J loses rank the Gauss-Newton
-step is the shortest one, and bounds as in `Rows`. All lengths are in columns scaled by plausible size.
+step is the shortest one, and bounds as in `WeightedRows`. All lengths are in columns scaled by plausible size.
 """
 
 from dataclasses import dataclass
@@ -22,8 +22,8 @@ from numpy.typing import NDArray
 
 from calibrate.fit.solvers.least_squares import (
     Ended,
-    Rows,
     Stop,
+    WeightedRows,
     columns,
     damped_step,
     gain_ratio,
@@ -58,7 +58,7 @@ def least_gain(tolerance: float, residual: Floats) -> float:
     return max(tolerance, max(ENOUGH * tolerance, ROUNDING) * float(residual @ residual))
 
 
-def levenberg(rows: Rows, theta: Floats, rules: LevenbergRules) -> Ended:
+def levenberg(rows: WeightedRows, theta: Floats, rules: LevenbergRules) -> Ended:
     """Least squares from theta (param,) within the bounds."""
     residual = rows.residual(theta)
     if not np.all(np.isfinite(residual)):
@@ -121,7 +121,7 @@ class DogLegRules:
     sigma: float = 0.25  # the radius is halved where the gain ratio of a step is below this
 
 
-def dogleg(rows: Rows, theta: Floats, rules: DogLegRules) -> Ended:
+def dogleg(rows: WeightedRows, theta: Floats, rules: DogLegRules) -> Ended:
     """Least squares from theta (param,) within the bounds."""
     residual = rows.residual(theta)
     if not np.all(np.isfinite(residual)):
@@ -160,7 +160,7 @@ class _Local:
     newton: Floats | None  # (active,) Gauss-Newton step; None where the slope is not finite
 
     @classmethod
-    def at(cls, rows: Rows, theta: Floats, residual: Floats) -> "_Local":
+    def at(cls, rows: WeightedRows, theta: Floats, residual: Floats) -> "_Local":
         slope = rows.jacobian(theta)
         gradient = slope.T @ residual
         active = ~rows.pressed(theta, gradient)

@@ -16,7 +16,7 @@ from acquisition.recording.rig import Arm, ArmModel, Joint, Pose
 from calibrate.model.arms.catalogue import ARMS
 from calibrate.model.arms.coupled_readings import by_reading, uncoupled
 from calibrate.model.arms.dh import DhLink
-from calibrate.model.arms.link_tolerance import HELD_AS_DRAWN
+from calibrate.model.arms.link_tolerance import HELD_NOMINAL
 from calibrate.model.arms.serial import (
     chain_frames,
     rotation_x,
@@ -81,7 +81,7 @@ def corrected_parts(arm: Arm, corrections: Mapping[str, float]) -> Floats:
 
     KeyError for a correction that the arm does not have.
     """
-    built = ARMS[arm.model](arm, HELD_AS_DRAWN)
+    built = ARMS[arm.model](arm, HELD_NOMINAL)
     theta = values_by_name(built.parameters, corrections)
     parts = built.fixed_parts(theta)
     parts[:-1] = parts[:-1] @ rotation_z(built.angle_offset_rad(theta))

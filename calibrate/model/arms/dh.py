@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibrate.model.arms.link_tolerance import (
-    LinkBelief,
+    LinkTolerance,
     link_angle,
     link_length,
     zero_parameter,
@@ -45,7 +45,7 @@ class DhArm(SerialArm):
     def __init__(
         self,
         links: tuple[DhLink, ...],
-        belief: LinkBelief,
+        tolerance: LinkTolerance,
         T_last_flange: Floats | None = None,
         T_base_first: Floats | None = None,
     ) -> None:
@@ -54,7 +54,7 @@ class DhArm(SerialArm):
         self._T_last_flange = np.eye(4) if T_last_flange is None else T_last_flange
         self._T_base_first = np.eye(4) if T_base_first is None else T_base_first
         self._twist_flange_last = adjoint(inverse(self._T_last_flange))
-        parameters = tuple(p for i, k in enumerate(links, start=1) for p in row_parameters(i, i, k, belief))
+        parameters = tuple(p for i, k in enumerate(links, start=1) for p in row_parameters(i, i, k, tolerance))
         super().__init__(n, parameters, tuple(frame for i in range(n) for frame in (i, i, i + 1, i + 1, i + 1)))
 
     def link_tail(self, theta: Floats) -> Floats:
@@ -98,12 +98,12 @@ def near_parallel(alpha_rad: float) -> bool:
     return abs(math.cos(alpha_rad)) > PARALLEL_COSINE
 
 
-def row_parameters(i: int, body: int, row: DhLink, belief: LinkBelief) -> tuple[Parameter, ...]:
+def row_parameters(i: int, body: int, row: DhLink, tolerance: LinkTolerance) -> tuple[Parameter, ...]:
     """Of row i, whose length, twist and tilt are those of link `body`."""
     return (
         zero_parameter(i),
-        link_length(f"link{i}.offset", belief),
-        link_length(f"link{body}.length", belief),
-        link_angle(f"link{body}.twist", belief),
-        link_angle(f"link{body}.tilt", belief, own=near_parallel(row.alpha_rad)),
+        link_length(f"link{i}.offset", tolerance),
+        link_length(f"link{body}.length", tolerance),
+        link_angle(f"link{body}.twist", tolerance),
+        link_angle(f"link{body}.tilt", tolerance, own=near_parallel(row.alpha_rad)),
     )

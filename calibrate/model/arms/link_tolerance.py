@@ -12,7 +12,7 @@ LINK_PLAUSIBLE = 1e-3  # m, rad
 
 
 @dataclass(frozen=True)
-class LinkBelief:
+class LinkTolerance:
     """One sigma about the drawing; 0 holds the links nominal, infinity leaves them free without an opinion."""
 
     length_sigma_m: float
@@ -26,8 +26,8 @@ class LinkBelief:
             )
 
 
-HELD_AS_DRAWN = LinkBelief(0.0, 0.0)
-FREE = LinkBelief(math.inf, math.inf)
+HELD_NOMINAL = LinkTolerance(0.0, 0.0)
+FREE = LinkTolerance(math.inf, math.inf)
 
 
 def zero_parameter(joint: int) -> Parameter:
@@ -35,17 +35,17 @@ def zero_parameter(joint: int) -> Parameter:
     return Parameter(f"joint{joint}.zero", "rad", ZERO_PLAUSIBLE_RAD)
 
 
-def link_length(name: str, belief: LinkBelief) -> Parameter:
+def link_length(name: str, tolerance: LinkTolerance) -> Parameter:
     """A correction (m) to a drawn length."""
-    return _believed(name, "m", belief.length_sigma_m, belief.assumed)
+    return _correction(name, "m", tolerance.length_sigma_m, tolerance.assumed)
 
 
-def link_angle(name: str, belief: LinkBelief, *, own: bool = True) -> Parameter:
+def link_angle(name: str, tolerance: LinkTolerance, *, own: bool = True) -> Parameter:
     """A correction (rad) to a drawn angle; held where it is not a motion of its own but another one's second name."""
-    return _believed(name, "rad", belief.angle_sigma_rad if own else 0.0, belief.assumed)
+    return _correction(name, "rad", tolerance.angle_sigma_rad if own else 0.0, tolerance.assumed)
 
 
-def _believed(name: str, unit: str, sigma: float, assumed: bool) -> Parameter:
+def _correction(name: str, unit: str, sigma: float, assumed: bool) -> Parameter:
     if sigma == 0.0:
         return Parameter(name, unit, LINK_PLAUSIBLE, free=False)
     if math.isinf(sigma):

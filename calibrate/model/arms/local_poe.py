@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibrate.model.arms.link_tolerance import (
-    LinkBelief,
+    LinkTolerance,
     link_angle,
     link_length,
     zero_parameter,
@@ -30,15 +30,15 @@ PER_JOINT = PER_PART + 1  # the part in front of the joint, then its zero
 class LocalPoeArm(SerialArm):
     """KinematicModel of fixed parts T_(i-1,i)(0), (joint + 1, 4, 4); all parameters are corrections to them."""
 
-    def __init__(self, parts: Floats, belief: LinkBelief) -> None:
+    def __init__(self, parts: Floats, tolerance: LinkTolerance) -> None:
         n = len(parts) - 1
         self._parts = parts
         self._error_columns = np.add.outer(PER_JOINT * np.arange(n + 1), np.arange(PER_PART))  # (joint + 1, 6)
         self._zero_columns = PER_JOINT * np.arange(n) + PER_PART
         parameters = tuple(
-            p for i in range(n) for p in (*_part_parameters(i, belief, own_yaw=False), zero_parameter(i + 1))
+            p for i in range(n) for p in (*_part_parameters(i, tolerance, own_yaw=False), zero_parameter(i + 1))
         )
-        last = _part_parameters(n, belief, own_yaw=True)
+        last = _part_parameters(n, tolerance, own_yaw=True)
         frames = np.repeat(np.arange(n + 1), PER_JOINT)[:-1]
         super().__init__(n, parameters + last, tuple(frames.tolist()))
 
@@ -59,10 +59,10 @@ class LocalPoeArm(SerialArm):
         return out
 
 
-def _part_parameters(i: int, belief: LinkBelief, *, own_yaw: bool) -> tuple[Parameter, ...]:
+def _part_parameters(i: int, tolerance: LinkTolerance, *, own_yaw: bool) -> tuple[Parameter, ...]:
     return (
-        *(link_length(f"link{i}.{axis}", belief) for axis in ("x", "y", "z")),
-        link_angle(f"link{i}.roll", belief),
-        link_angle(f"link{i}.pitch", belief),
-        link_angle(f"link{i}.yaw", belief, own=own_yaw),
+        *(link_length(f"link{i}.{axis}", tolerance) for axis in ("x", "y", "z")),
+        link_angle(f"link{i}.roll", tolerance),
+        link_angle(f"link{i}.pitch", tolerance),
+        link_angle(f"link{i}.yaw", tolerance, own=own_yaw),
     )

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibrate.model.arms.dh import DhLink, nominal_rows, row_parameters
-from calibrate.model.arms.link_tolerance import LinkBelief
+from calibrate.model.arms.link_tolerance import LinkTolerance
 from calibrate.model.arms.serial import (
     SerialArm,
     rotation_x,
@@ -35,14 +35,14 @@ class MdhArm(SerialArm):
     def __init__(
         self,
         rows: tuple[DhLink, ...],
-        belief: LinkBelief,
+        tolerance: LinkTolerance,
         T_last_flange: Floats | None = None,
         T_base_first: Floats | None = None,
     ) -> None:
         self._nominal = nominal_rows(rows)
         self._T_last_flange = np.eye(4) if T_last_flange is None else T_last_flange
         self._T_base_first = np.eye(4) if T_base_first is None else T_base_first
-        parameters = tuple(p for i, row in enumerate(rows, start=1) for p in row_parameters(i, i - 1, row, belief))
+        parameters = tuple(p for i, row in enumerate(rows, start=1) for p in row_parameters(i, i - 1, row, tolerance))
         super().__init__(len(rows), parameters, tuple(np.repeat(np.arange(len(rows)), PER_ROW).tolist()))
 
     def fixed_parts(self, theta: Floats) -> Floats:

@@ -27,7 +27,7 @@ SIZE = (0.4, 2.5)  # of an error alike, over the row's own
 COSINE = 0.8  # between both errors
 
 
-class BlunderKind(Enum):
+class GrossErrorKind(Enum):
     """Faults of a file, not of an arm; the value is the short name for a person."""
 
     DEGREES = "joint angles in degrees"
@@ -49,10 +49,10 @@ class BlunderKind(Enum):
 
 
 @dataclass(frozen=True)
-class Blunder:
+class GrossError:
     """One named fault. `rows` count from 0; empty: the whole file is affected and there is nothing to fit."""
 
-    kind: BlunderKind
+    kind: GrossErrorKind
     rows: tuple[int, ...]
     column: str
     what: str

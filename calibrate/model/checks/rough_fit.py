@@ -22,8 +22,8 @@ from scipy.spatial.transform import Rotation
 from acquisition.recording.samples import POSITION
 from calibrate.model.alignment import rigid_motion, weighted_mean
 from calibrate.model.checks.gross_error import (
-    Blunder,
-    BlunderKind,
+    GrossError,
+    GrossErrorKind,
     Shots,
     err_alike,
     outlying,
@@ -122,7 +122,7 @@ def rough_fit_of_targets(
     return RoughFit(linear, shift, point_m, distance, median(distance))
 
 
-def rows_of_another_session(shots: Shots) -> tuple[Blunder, ...]:
+def rows_of_another_session(shots: Shots) -> tuple[GrossError, ...]:
     """One gross error a block. `shots` are positions (k = 3) after a fit that such blocks could not pull."""
     misfit = shots.misfit()
     distance = np.linalg.norm(misfit, axis=1)
@@ -134,7 +134,7 @@ def rows_of_another_session(shots: Shots) -> tuple[Blunder, ...]:
 
 def sessions_apart(
     T_base_flange: Floats, position_m: Floats, point_m: Floats | None, rows: Rows
-) -> tuple[Blunder, ...]:
+) -> tuple[GrossError, ...]:
     """The same before any fit, by the nominal arm: blocks whose frame is so far off that no fit may see them.
 
     `T_base_flange` (pose, 4, 4) nominal, positions (pose, 3) of these rows of the samples, `point_m` the target.
@@ -170,7 +170,7 @@ def _of_the_arm(shots: Shots, block: Rows, misfit: Floats) -> bool:
     return int(outside.sum()) >= FEWEST_ROWS and float(np.mean(err_alike(misfit, posture, block, outside))) > SHARED
 
 
-def _block(shots: Shots, first: int, last: int, misfit: Floats, scale: float) -> Blunder | None:
+def _block(shots: Shots, first: int, last: int, misfit: Floats, scale: float) -> GrossError | None:
     """The block as another frame, None if a frame of its own does not explain it."""
     inside = slice(first, last + 1)
     if _of_the_arm(shots, np.arange(first, last + 1), misfit):
@@ -191,6 +191,6 @@ def _block(shots: Shots, first: int, last: int, misfit: Floats, scale: float) ->
         "rows of another session, or the device was moved"
     )
     rows = tuple(int(r) for r in shots.rows[inside])
-    return Blunder(
-        BlunderKind.OTHER_SESSION, rows, ", ".join(shots.columns), what, "identify them as a file of their own"
+    return GrossError(
+        GrossErrorKind.OTHER_SESSION, rows, ", ".join(shots.columns), what, "identify them as a file of their own"
     )

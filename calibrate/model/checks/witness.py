@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from acquisition.recording import Samples
 from acquisition.recording.rig import Rig
 from acquisition.recording.samples import TARGET
-from calibrate.model.checks.gross_error import BlunderKind
+from calibrate.model.checks.gross_error import GrossErrorKind
 
 Floats = NDArray[np.float64]
 Rows = NDArray[np.intp]
@@ -68,7 +68,7 @@ class Witness(Protocol):
 class Otherwise:
     """Another convention of an instrument's columns, and its readings then."""
 
-    kind: BlunderKind
+    kind: GrossErrorKind
     column: str
     what: str
     remedy: str

@@ -90,7 +90,7 @@ def _varies(values: Floats) -> bool:
 
 
 @dataclass(frozen=True)
-class Curve(Term):
+class SmoothCurve(Term):
     """`waves` eigenfunctions of each driver, products of them for two; at `component` of the port."""
 
     component: int = 0
@@ -133,15 +133,15 @@ def unit_of(port: Port, component: int) -> str:
     return "rad" if rotates else "m"
 
 
-def curve(port: Port, component: int, names: tuple[str, ...], waves: int) -> Curve:
+def curve(port: Port, component: int, names: tuple[str, ...], waves: int) -> SmoothCurve:
     """A Curve with what follows from its drivers."""
     slow = all(is_slow_cause(name) for name in names)
     shape = Shape.SMOOTH if len(names) == 1 else Shape.PRODUCT
-    return Curve(port, names, shape, UNKNOWN, slow=slow, open=True, component=component, waves=waves)
+    return SmoothCurve(port, names, shape, UNKNOWN, slow=slow, open=True, component=component, waves=waves)
 
 
 @dataclass(frozen=True)
-class Unit(Curve):
+class Unit(SmoothCurve):
     """Constant one at a component: its column is the sensitivity of all rows."""
 
     def basis(self, drivers: Drivers, inner: Floats) -> Floats:

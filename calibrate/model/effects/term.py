@@ -27,7 +27,7 @@ Floats = NDArray[np.float64]
 Functions = Callable[[Drivers, Floats], Floats]  # (pose, m) or (pose, width, m) for inner values (inner,)
 # (pose, 1 or width) for coefficients (m,) and inner values (inner,)
 Exact = Callable[[Drivers, Floats, Floats], Floats]
-Believable = Callable[[Floats, Floats], bool]  # of coefficients (m,) and inner values (inner,)
+Plausible = Callable[[Floats, Floats], bool]  # of coefficients (m,) and inner values (inner,)
 NOISE_ALLOWS = 30.0  # times the data's own noise: a coarse machine may be worse than a limit for good ones
 
 
@@ -154,7 +154,7 @@ class Effect(Protocol):
         ...
 
 
-NOT_TOLD = "(not determined by these data)"
+NOT_DETERMINED = "(not determined by these data)"
 
 
 # Ending of a name, with (from this size on, factor, unit), largest first. The first ending that fits is taken.
@@ -186,7 +186,7 @@ UNITS: tuple[tuple[str, Steps], ...] = (
 def plain(name: str, size: Size) -> str:
     """Value, sigma and unit of a size with its unit in its name: 68.0 ± 2.0 µrad per Nm. No number without a sigma."""
     if not math.isfinite(size.sigma):
-        return NOT_TOLD
+        return NOT_DETERMINED
     for ending, steps in UNITS:
         if name.endswith(ending):
             scale, unit = next((s, u) for least, s, u in steps if abs(size.value) >= least)
@@ -225,7 +225,7 @@ class Form(Term):
     about: Callable[[Drivers], Floats] | None = field(kw_only=True, default=None)  # directions that follow the session
     polar: bool = field(kw_only=True, default=False)  # coefficients are (sine, cosine): reported as amplitude, phase
     exact: Exact | None = field(kw_only=True, default=None)  # where `function` is the first order only
-    believable: Believable | None = field(kw_only=True, default=None)  # what is more than a limit of size
+    believable: Plausible | None = field(kw_only=True, default=None)  # what is more than a limit of size
 
     def basis(self, drivers: Drivers, inner: Floats) -> Floats:
         values, directions = self.function(drivers, inner), self.along(drivers)
@@ -290,9 +290,9 @@ def _polar(names: tuple[str, ...], values: Floats, covariance: Floats) -> dict[s
     a, b = values
     amplitude = float(np.hypot(a, b))
     by = np.array([[a, b], [-b / max(amplitude, 1e-300), a / max(amplitude, 1e-300)]]) / max(amplitude, 1e-300)
-    told = bool(np.isfinite(np.diag(covariance)).all())
-    sigma = np.sqrt(np.maximum(np.diag(by @ covariance @ by.T), 0.0)) if told else np.full(2, np.inf)
+    determined = bool(np.isfinite(np.diag(covariance)).all())
+    sigma = np.sqrt(np.maximum(np.diag(by @ covariance @ by.T), 0.0)) if determined else np.full(2, np.inf)
     return {
         names[0]: Size(amplitude, float(sigma[0])),
-        names[1]: Size(float(np.arctan2(b, a)), float(min(sigma[1], np.pi)) if told else np.inf),
+        names[1]: Size(float(np.arctan2(b, a)), float(min(sigma[1], np.pi)) if determined else np.inf),
     }

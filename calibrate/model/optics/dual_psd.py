@@ -51,7 +51,7 @@ class Fixture:
 
 
 @dataclass(frozen=True)
-class PairBelief:
+class PairTolerance:
     """One sigma of PSD 2 in PSD 1, about its own axes."""
 
     length_sigma_m: float
@@ -71,7 +71,7 @@ class DualPsd(Usage):
     placement: Ints  # (pose,)
     first_psd: Ints  # (pose,) 1 or 2
     gain_prior: float | None = None  # one sigma of the four gains; None: exact, held
-    pair_prior: PairBelief | None = None  # of PSD 2 in PSD 1; None: exact, held
+    pair_prior: PairTolerance | None = None  # of PSD 2 in PSD 1; None: exact, held
 
     unit = "m"
 
@@ -238,11 +238,11 @@ def _beam_motions(T_psd1_psd2: Floats, first_psd: int) -> Floats:
     return np.stack([adjoint(mirror) - np.eye(6), -np.eye(6)])
 
 
-def _pair_parameters(belief: PairBelief | None) -> tuple[Parameter, ...]:
-    length, angle = (None, None) if belief is None else (belief.length_sigma_m, belief.angle_sigma_rad)
+def _pair_parameters(tolerance: PairTolerance | None) -> tuple[Parameter, ...]:
+    length, angle = (None, None) if tolerance is None else (tolerance.length_sigma_m, tolerance.angle_sigma_rad)
     sizes = [("m", PAIR_PLAUSIBLE_M, length)] * 3 + [("rad", PAIR_PLAUSIBLE_RAD, angle)] * 3
     pair = (_held_unless(f"psd2.{a}", *size) for a, size in zip(AXES, sizes, strict=True))
-    return tuple(replace(p, assumed=belief is not None and belief.assumed) for p in pair)
+    return tuple(replace(p, assumed=tolerance is not None and tolerance.assumed) for p in pair)
 
 
 def _held_unless(name: str, unit: str, plausible: float, prior: float | None, start: float = 0.0) -> Parameter:

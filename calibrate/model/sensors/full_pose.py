@@ -18,7 +18,7 @@ from acquisition.recording.rig import Rig
 from acquisition.recording.samples import ORIENTATION, POSITION
 from calibrate.model.alignment import best_rotation, nearest_rotation
 from calibrate.model.chain import About, Chain, Usage
-from calibrate.model.checks.gross_error import BlunderKind
+from calibrate.model.checks.gross_error import GrossErrorKind
 from calibrate.model.checks.rough_fit import median, weights
 from calibrate.model.checks.witness import (
     Otherwise,
@@ -178,7 +178,7 @@ class OrientationWitness:
         other = replace(self, rotation_rad=np.radians(self.rotation_rad))
         yield (
             Otherwise(
-                BlunderKind.DEGREES,
+                GrossErrorKind.DEGREES,
                 self.columns,
                 "rotation vectors in degrees",
                 "write radians (degrees times pi/180)",
@@ -189,7 +189,7 @@ class OrientationWitness:
         other = replace(self, rotation_rad=-self.rotation_rad)
         yield (
             Otherwise(
-                BlunderKind.INVERTED_ROTATION,
+                GrossErrorKind.INVERTED_ROTATION,
                 self.columns,
                 "rotation vectors of the device in the target's axes",
                 "change the sign of all three columns: they lead from the device to the target",

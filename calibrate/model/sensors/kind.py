@@ -18,7 +18,7 @@ if TYPE_CHECKING:  # an entry only names them
     from acquisition.recording import Samples
     from acquisition.recording.rig import Rig
     from calibrate.model.chain import Sensor
-    from calibrate.model.checks.gross_error import Blunder, Shots
+    from calibrate.model.checks.gross_error import GrossError, Shots
     from calibrate.model.checks.witness import Witness
     from calibrate.model.parameters import Parameter
     from calibrate.model.problem import Block, Measured
@@ -137,7 +137,7 @@ class SensorKind:
     lengths: Callable[[SampleTable], tuple[Block, ...]] = lambda table: ()  # known beside the readings
     point_m: Callable[[SampleTable], Floats | None] = lambda table: None  # (3,) target in the flange, from nothing else
     witness: Callable[[Rig, Samples, Floats], Witness | None] = lambda rig, samples, q_rad: None
-    blocks: Callable[[Shots], tuple[Blunder, ...]] = lambda shots: ()  # rows of another session
+    blocks: Callable[[Shots], tuple[GrossError, ...]] = lambda shots: ()  # rows of another session
     far_m: Callable[[Rig], float] = lambda rig: np.inf  # a reading farther off was not moved there by a bump
     predict: Callable[[Found, Floats, Samples], Columns] | None = None
     observed: Callable[[Found, Samples], Columns | None] = lambda found, samples: None  # where no column of `reads` is

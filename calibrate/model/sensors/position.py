@@ -12,7 +12,7 @@ from acquisition.recording.rig import Rig
 from acquisition.recording.samples import ORIENTATION, POSITION, TARGET
 from calibrate.errors import DataError
 from calibrate.model.chain import About, Chain, Usage
-from calibrate.model.checks.gross_error import BlunderKind
+from calibrate.model.checks.gross_error import GrossErrorKind
 from calibrate.model.checks.rough_fit import rough_fit_of_targets, rows_of_another_session
 from calibrate.model.checks.witness import (
     ENOUGH_POSES,
@@ -134,7 +134,7 @@ class PositionWitness:
         other = replace(self, mirrored=not self.mirrored)
         yield (
             Otherwise(
-                BlunderKind.MIRRORED_AXIS,
+                GrossErrorKind.MIRRORED_AXIS,
                 self.columns,
                 "only the mirror image of the readings fits the arm (determinant -1), and no instrument is left-handed",
                 "change the sign of one of these columns, or exchange two, as the device's export shows",
@@ -145,7 +145,7 @@ class PositionWitness:
         other = replace(self, position_m=MILLIMETRES * self.position_m)
         yield (
             Otherwise(
-                BlunderKind.MILLIMETRES,
+                GrossErrorKind.MILLIMETRES,
                 self.columns,
                 "positions in millimetres",
                 "write metres (millimetres times 0.001)",

@@ -19,7 +19,7 @@ from acquisition.recording.samples import SPOTS
 from calibrate.errors import DataError
 from calibrate.model.alignment import best_rotation
 from calibrate.model.chain import Chain
-from calibrate.model.checks.gross_error import BlunderKind
+from calibrate.model.checks.gross_error import GrossErrorKind
 from calibrate.model.checks.rough_fit import median, weights
 from calibrate.model.checks.witness import (
     Otherwise,
@@ -76,9 +76,9 @@ class SpotsWitness:
         distance, moved = np.zeros(beam.shape[:-1]), []
         for place in np.unique(self.placement):
             rows = self.placement == place
-            believed = self.T_base_psd1[int(place)]
+            nominal = self.T_base_psd1[int(place)]
             distance[..., rows], shift_m = _placed(
-                near[rows], far[rows], origin[..., rows, :], beam[..., rows, :], believed
+                near[rows], far[rows], origin[..., rows, :], beam[..., rows, :], nominal
             )
             moved.append(shift_m)
         return Strain(median(distance), median(np.stack(moved, axis=-1)))
@@ -86,14 +86,14 @@ class SpotsWitness:
     def otherwise(self) -> Iterator[Otherwise]:
         """Detectors exchanged in the order of the light, and millimetres. Mirrored axes: spot_signs.py."""
         yield Otherwise(
-            BlunderKind.EXCHANGED_PSD,
+            GrossErrorKind.EXCHANGED_PSD,
             "column first_psd",
             "the beam strikes the other detector first",
             "write 1 for 2 and 2 for 1",
             replace(self, first_psd=3 - self.first_psd),
         )
         yield Otherwise(
-            BlunderKind.MILLIMETRES,
+            GrossErrorKind.MILLIMETRES,
             "columns psd1_x_m, psd1_y_m, psd2_x_m, psd2_y_m",
             "spots in millimetres",
             "write metres (millimetres times 0.001)",
@@ -112,16 +112,16 @@ class SpotsWitness:
         return near, far - 2.0 * np.sum((far - near) * normal, axis=1, keepdims=True) * normal
 
 
-def _placed(near: Floats, far: Floats, origin: Floats, beam: Floats, believed: Floats) -> tuple[Floats, Floats]:
+def _placed(near: Floats, far: Floats, origin: Floats, beam: Floats, nominal: Floats) -> tuple[Floats, Floats]:
     """(distance (..., pose), moved (...) in m) of one fixture, its lines (pose, 3), the laser's (..., pose, 3).
 
     A distance is the mean of those of both points of a line from the laser's line.
     """
     weight, distance = np.ones(beam.shape[:-1]), np.zeros(beam.shape[:-1])
-    turn, shift = believed[:3, :3], believed[:3, 3]
+    turn, shift = nominal[:3, :3], nominal[:3, 3]
     along = far - near
     along = along / np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-12)
-    points, own = np.stack([near, far]), believed[:3, 3]
+    points, own = np.stack([near, far]), nominal[:3, 3]
     origins, beams = origin[..., None, :, :], beam[..., None, :, :]
     for _ in range(TURNS):
         turn = best_rotation(beam, along, weight)
@@ -135,7 +135,7 @@ def _placed(near: Floats, far: Floats, origin: Floats, beam: Floats, believed: F
         off = _across(shift[..., None, :], beam)[..., None, :, :] - gap
         distance = np.linalg.norm(off, axis=-1).mean(axis=-2)
         weight = weights(distance)
-    turned = Rotation.from_matrix((turn @ believed[:3, :3].T).reshape(-1, 3, 3)).magnitude()
+    turned = Rotation.from_matrix((turn @ nominal[:3, :3].T).reshape(-1, 3, 3)).magnitude()
     return distance, np.linalg.norm(shift - own, axis=-1) + LEVER_M * turned.reshape(turn.shape[:-2])
 
 

@@ -13,7 +13,7 @@ from acquisition.recording.samples import WIRE as COLUMN
 from calibrate.errors import DataError
 from calibrate.model.alignment import trilaterate
 from calibrate.model.chain import About, Chain, Usage
-from calibrate.model.checks.gross_error import BlunderKind
+from calibrate.model.checks.gross_error import GrossErrorKind
 from calibrate.model.checks.rough_fit import least_distance, median
 from calibrate.model.checks.witness import (
     Otherwise,
@@ -123,7 +123,7 @@ class WireWitness:
         """Millimetres."""
         remedy = "write metres (millimetres times 0.001)"
         converted = replace(self, length_m=1e-3 * self.length_m)
-        yield Otherwise(BlunderKind.MILLIMETRES, "column wire_m", "lengths in millimetres", remedy, converted)
+        yield Otherwise(GrossErrorKind.MILLIMETRES, "column wire_m", "lengths in millimetres", remedy, converted)
 
 
 def _trilaterated(points_m: Floats, lengths_m: Floats) -> Floats:

@@ -15,7 +15,7 @@ from acquisition.recording import Samples
 from calibrate.errors import DataError
 from calibrate.model.arms.catalogue import arm_of
 from calibrate.model.arms.serial import SerialArm
-from calibrate.model.effect_records import Effect
+from calibrate.model.effect_records import EffectRecord
 from calibrate.model.effects.catalogue import EFFECTS
 from calibrate.model.effects.conditions import temperatures_of
 from calibrate.model.effects.curve import cause, curve
@@ -44,7 +44,7 @@ CARRIED = 0.05  # of an effect's size: more may not be lost where its columns ar
 class Carried:
     """An effect of the file with its term of the catalogue."""
 
-    record: Effect
+    record: EffectRecord
     accepted: Accepted
 
     @property
@@ -68,7 +68,7 @@ class Acting:
         return self.carried.accepted.term.port
 
 
-def listed(effects: Sequence[Effect], drivers: Drivers) -> tuple[Carried, ...]:
+def listed(effects: Sequence[EffectRecord], drivers: Drivers) -> tuple[Carried, ...]:
     """Each effect with its term. DataError for one that the catalogue does not list for this session."""
     wanted = {effect.listed or effect.physics for effect in effects}
     derived = any(effect.shape == Shape.HYSTERESIS.value for effect in effects)  # the file holds it as a column
@@ -124,7 +124,7 @@ def range_of(drivers: Drivers, name: str) -> Floats | None:
         return None
 
 
-def _term(effect: Effect, terms: Sequence[Term], drivers: Drivers) -> Term:
+def _term(effect: EffectRecord, terms: Sequence[Term], drivers: Drivers) -> Term:
     if effect.waves is not None and effect.component is not None:
         port = _port_of(effect, drivers)
         return curve(port, effect.component, tuple(effect.depends_on.split(",")), effect.waves)
@@ -139,7 +139,7 @@ def _term(effect: Effect, terms: Sequence[Term], drivers: Drivers) -> Term:
     )
 
 
-def _port_of(effect: Effect, drivers: Drivers) -> Port:
+def _port_of(effect: EffectRecord, drivers: Drivers) -> Port:
     """Where a curve acts. A tilt of link 1 in front of its joint and one behind it have the same name, so that a file
     without `place` states where only if one port has that name.
     """
@@ -153,12 +153,12 @@ def _port_of(effect: Effect, drivers: Drivers) -> Port:
     raise DataError(f"effect {effect.name} at {effect.where}: {why}; diagnose the recording again")
 
 
-def _is_at(effect: Effect, port: Port) -> bool:
+def _is_at(effect: EffectRecord, port: Port) -> bool:
     of_frame = port.place is not Place.FRAME or effect.frame == port.index
     return not effect.place or (port.place.value == effect.place and of_frame)
 
 
-def _accepted(effect: Effect, term: Term) -> Accepted:
+def _accepted(effect: EffectRecord, term: Term) -> Accepted:
     coefficients = np.array(list(effect.coefficients.values()), dtype=np.float64)
     missing = [spec.name for spec in term.inner if spec.name not in effect.inner]
     if missing:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from acquisition.recording import Samples
 from acquisition.recording.samples import SEAT, required
 from calibrate.errors import DataError
-from calibrate.model.effect_records import Effect
+from calibrate.model.effect_records import EffectRecord
 from calibrate.model.effects.conditions import MOVED_RAD, moves_of
 from calibrate.model.effects.drivers import Drivers
 from calibrate.model.effects.loads import UNSTATED_CENTRE_M
@@ -241,7 +241,7 @@ def recorded_samples(model: ModelFile, n_joints: int) -> Samples:
     return Samples(table, n_joints)
 
 
-def _used(effects: Sequence[Effect], same_session: bool) -> tuple[list[Effect], tuple[str, ...]]:
+def _used(effects: Sequence[EffectRecord], same_session: bool) -> tuple[list[EffectRecord], tuple[str, ...]]:
     """Those that act, and a sentence for each that does not. An aftermath acts with the values of what left it."""
     by_name = {effect.name: effect for effect in effects}
     if same_session:
@@ -267,7 +267,9 @@ def conditions_of_effects(model: ModelFile) -> frozenset[str]:
     return frozenset(model.needs) | (frozenset(PAYLOAD) if weighs else frozenset())
 
 
-def _with_payload(recorded: Samples, asked: Samples, effects: Sequence[Effect]) -> tuple[Samples, tuple[str, ...]]:
+def _with_payload(
+    recorded: Samples, asked: Samples, effects: Sequence[EffectRecord]
+) -> tuple[Samples, tuple[str, ...]]:
     """The session's rows with the columns of a payload that the rows asked for state and the session did not record.
 
     Without a payload in the session they are nought there, and nothing else changes; sentences on what was assumed.

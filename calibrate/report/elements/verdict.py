@@ -44,7 +44,7 @@ class Trust(Enum):
 
 
 @dataclass(frozen=True)
-class Verdict:
+class VerdictBox:
     """One sentence, every reason for care, and what to do."""
 
     trust: Trust
@@ -79,7 +79,7 @@ class Number:
 class Answers:
     """All of the first screen."""
 
-    verdict: Verdict
+    verdict: VerdictBox
     numbers: tuple[Number, ...]
     known: tuple[str, ...] = ()  # what to know before the numbers are used: what is missing, what limits
     limit: str = ""  # the step that would make the tool error smaller, where one does

@@ -8,7 +8,7 @@ from calibrate.model.model_file import Fields, ModelFile, UnseenRows
 
 
 @dataclass(frozen=True)
-class Scatter:
+class ScatterTest:
     """Chi-square under the noise as assumed."""
 
     chi2: float
@@ -60,13 +60,13 @@ def fit_end(model: ModelFile) -> tuple[str, int, str] | None:
     return None if end is None else (f"{end.method}, {end.loss}", end.iterations, f"{end.ended_by}: {end.says}")
 
 
-def scatter(model: ModelFile) -> Scatter | None:
+def scatter(model: ModelFile) -> ScatterTest | None:
     """None in a model that was written before there was this test."""
     chi2, dof = _number(model.noise, "chi2_stated"), _number(model.noise, "dof")
     alarm = model.noise.get("alarm")
     if chi2 is None or dof is None or not isinstance(alarm, str):
         return None
-    return Scatter(chi2, int(dof), _number(model.noise, "p_stated"), Alarm[alarm])
+    return ScatterTest(chi2, int(dof), _number(model.noise, "p_stated"), Alarm[alarm])
 
 
 def repeated(model: ModelFile) -> Repeated | None:

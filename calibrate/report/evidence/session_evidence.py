@@ -20,7 +20,7 @@ from calibrate.fit.accuracy import spare_readings
 from calibrate.fit.fit_plan import DEFAULT, parse_plan
 from calibrate.fit.identify.session import instruments_for_fit, rig_as_planned, samples_as_planned, standing_at
 from calibrate.fit.joint_problem import JointProblem
-from calibrate.fit.noise import VarianceFactors, as_believed
+from calibrate.fit.noise import VarianceFactors, as_assumed
 from calibrate.fit.rank import analyse
 from calibrate.fit.solvers import solve
 from calibrate.fit.weighting import Weighting
@@ -89,7 +89,7 @@ def noise_of(weighting: Weighting, model: ModelFile) -> VarianceFactors:
         found, believed = model.noise.get(source), model.noise.get(f"{source}_believed")
         if isinstance(found, float) and isinstance(believed, float) and found > 0.0 and believed > 0.0:
             size[i] = 2.0 * np.log(found / believed)
-    return replace(as_believed(len(size)), log_variance=size)
+    return replace(as_assumed(len(size)), log_variance=size)
 
 
 def _placed(measured: Measured, about: About) -> Measured:

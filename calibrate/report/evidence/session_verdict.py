@@ -29,11 +29,11 @@ from calibrate.report.elements.verdict import (
     WORSE_UNSEEN,
     Doubt,
     Trust,
-    Verdict,
+    VerdictBox,
 )
 from calibrate.report.evidence.model_tests import (
     Repeated,
-    Scatter,
+    ScatterTest,
     proofs,
     repeated,
     scatter,
@@ -99,27 +99,27 @@ WORTH_SAYING = 0.1  # of what remains: a pattern of less changes no decision
 FAILED = (Status.NOT_FINITE.name, Status.OUT_OF_STEPS.name, Status.STALLED.name)
 
 
-def session_verdict(evidence: SessionEvidence, diagnosis: DiagnosisFile | None = None) -> Verdict:
+def session_verdict(evidence: SessionEvidence, diagnosis: DiagnosisFile | None = None) -> VerdictBox:
     """From model and recording; the thresholds are those at the top of this file and of verdict.py."""
     model = evidence.model
     doubts = [*_doubts(evidence), *_doubts_of_rank(evidence), *_doubts_of_diagnosis(diagnosis, model)]
     reasons = tuple(says for says, _ in doubts)
     advice = tuple(dict.fromkeys((*(do for _, do in doubts if do), *_harmless(scatter(model)))))
     if model.status in FAILED:
-        return Verdict(Trust.NONE, f"No usable model: {model.says}.", reasons, (AGAIN, *advice))
+        return VerdictBox(Trust.NONE, f"No usable model: {model.says}.", reasons, (AGAIN, *advice))
     if checks_nothing(evidence.spare):
-        return Verdict(Trust.NONE, f"{UNCHECKED} Do not use this model.", reasons, (MORE_POSES, *advice))
+        return VerdictBox(Trust.NONE, f"{UNCHECKED} Do not use this model.", reasons, (MORE_POSES, *advice))
     first = next(iter(proofs(model)), None)
     if model.session is None and first is None:  # a diagnosis keeps its proof in diagnosis.json
         sentence = f"{_how_good(evidence, first)} {UNPROVED} Do not use this model."
-        return Verdict(Trust.NONE, sentence, (UNPROVED, *reasons), (TO_PROVE, *advice))
+        return VerdictBox(Trust.NONE, sentence, (UNPROVED, *reasons), (TO_PROVE, *advice))
     if first is not None and first.rms_distance_after_m > NO_BETTER * first.rms_distance_before_m:
         keep = "Keep the nominal values; find out what is wrong with arm, instrument or poses, and measure again."
-        return Verdict(Trust.NONE, f"{_how_good(evidence, first)} Do not use this model.", reasons, (keep, *advice))
+        return VerdictBox(Trust.NONE, f"{_how_good(evidence, first)} Do not use this model.", reasons, (keep, *advice))
     if not doubts:
         ready = "Correct poses and programs with it (`calibeam correct`), or export it (`calibeam export-model`)."
-        return Verdict(Trust.GOOD, f"{_how_good(evidence, first)} What remains is noise.", (), (ready, *advice))
-    return Verdict(Trust.CARE, f"{_how_good(evidence, first)} Use it, with care.", reasons, advice)
+        return VerdictBox(Trust.GOOD, f"{_how_good(evidence, first)} What remains is noise.", (), (ready, *advice))
+    return VerdictBox(Trust.CARE, f"{_how_good(evidence, first)} Use it, with care.", reasons, advice)
 
 
 def worst_pattern(evidence: SessionEvidence) -> Pattern | None:
@@ -212,7 +212,7 @@ def _doubts_of_diagnosis(found: DiagnosisFile | None, model: ModelFile) -> Itera
     )
 
 
-def _doubts_of_scatter(found: Scatter | None, repeats: Repeated | None) -> Iterator[Doubt]:
+def _doubts_of_scatter(found: ScatterTest | None, repeats: Repeated | None) -> Iterator[Doubt]:
     if found is None:
         return
     if found.alarm is Alarm.ABOVE_STATED:
@@ -233,7 +233,7 @@ def _doubts_of_scatter(found: Scatter | None, repeats: Repeated | None) -> Itera
         )
 
 
-def _harmless(found: Scatter | None) -> Iterator[str]:
+def _harmless(found: ScatterTest | None) -> Iterator[str]:
     """An alarm that makes no number worse: sigmas are of the scatter found."""
     if found is not None and found.alarm is Alarm.BELOW_STATED:
         yield (

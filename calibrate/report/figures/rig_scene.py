@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from calibrate.model.assumed_rig import BelievedRig
+from calibrate.model.assumed_rig import AssumedRig
 from calibrate.model.dual_psd_rig import fixture_of
 from calibrate.model.observations import Observations
 from calibrate.model.optics import AXES
@@ -20,7 +20,7 @@ Floats = NDArray[np.float64]
 class FittedRig:
     """The rig with everything that the fit corrected."""
 
-    believed: BelievedRig
+    believed: AssumedRig
     T_psd1_psd2: Floats  # (4, 4)
     half_size_m: float
 
@@ -42,7 +42,7 @@ def fitted_rig(session: SpotSession) -> FittedRig:
     rig, corrections = session.rig, session.corrections
     fixture = fixture_of(rig)
     pair = pose_offset(np.array([corrections.get(f"psd2.{axis}", 0.0) for axis in AXES]))
-    return FittedRig(BelievedRig(rig, corrections), fixture.T_psd1_psd2 @ pair, fixture.half_size_m)
+    return FittedRig(AssumedRig(rig, corrections), fixture.T_psd1_psd2 @ pair, fixture.half_size_m)
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 from acquisition.recording.rig import Rig
 from calibrate.fit.accuracy import Alarm
 from calibrate.fit.weighting import JOINT
-from calibrate.model.model_file import FreeSpaceRecord, ModelFile, UnseenRows
+from calibrate.model.model_file import ModelFile, UnseenRows, WorkspaceErrorRecord
 from calibrate.model.sensors.catalogue import SOURCES, kind_of
 from calibrate.model.sensors.kind import NoiseSource
 from calibrate.quantities import (
@@ -33,7 +33,7 @@ from calibrate.report.evidence.model_tests import (
 from calibrate.report.evidence.session_evidence import SessionEvidence
 
 
-def free_space(found: FreeSpaceRecord | None) -> list[Html]:
+def free_space(found: WorkspaceErrorRecord | None) -> list[Html]:
     """A table; the reason where there is no prediction; nothing of a model from before there was one."""
     if found is None:
         return []
@@ -63,11 +63,11 @@ def _three(*values_m: float | None) -> tuple[str, ...]:
     return tuple(DASH if value is None else length(value) for value in values_m)
 
 
-def _because(found: FreeSpaceRecord) -> list[Html]:
+def _because(found: WorkspaceErrorRecord) -> list[Html]:
     return [bullets(found.undetermined)] if found.undetermined else []
 
 
-def _guessed(found: FreeSpaceRecord) -> list[Html]:
+def _guessed(found: WorkspaceErrorRecord) -> list[Html]:
     if not found.guessed:
         return []
     listed = "; ".join(found.guessed)

@@ -8,7 +8,7 @@ import numpy as np
 from acquisition.recording import Recording
 from acquisition.recording.rig.schema import SiteInstrument
 from calibrate.diagnose.record.schema import DiagnosisFile
-from calibrate.model.model_file import FreeSpaceRecord
+from calibrate.model.model_file import WorkspaceErrorRecord
 from calibrate.model.sensors.catalogue import kind_of
 from calibrate.quantities import DASH, length, significant
 from calibrate.report.elements.html import (
@@ -155,7 +155,7 @@ def _rms(values: np.ndarray) -> float:
     return float(np.sqrt(np.mean(values**2)))
 
 
-def _anywhere(room: FreeSpaceRecord | None) -> Number:
+def _anywhere(room: WorkspaceErrorRecord | None) -> Number:
     """What 95 % of all poses between the joint limits stay below, one sigma, as predicted; or why there is none."""
     if room is None or room.pose_p95_m is None:
         why = "not predicted" if room is None else f"not determined: {room.says}"

@@ -41,7 +41,7 @@ BAR_IN, BAR_HIGH_IN, BAR_TEXT_IN = 0.75, 0.16, 0.5  # the scale at the bottom, i
 
 
 @dataclass(frozen=True)
-class Measured:
+class MeasuredErrors:
     """Errors at poses of the session."""
 
     points_m: Floats  # (row, 3) of the target in the base
@@ -59,7 +59,7 @@ class Layer:
     values_m: Floats | None = None
 
 
-def before_and_after(room: Room, measured: Measured | None) -> Html:
+def before_and_after(room: Room, measured: MeasuredErrors | None) -> Html:
     """Both views of both states; in a second row what was measured."""
     grids = tuple(grid_of(view, room.reach_m) for view in VIEWS)
     rows = {"predicted": _predicted(room, grids)}

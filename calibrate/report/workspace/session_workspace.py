@@ -20,7 +20,7 @@ from calibrate.report.elements.html import (
     tag,
 )
 from calibrate.report.evidence.session_evidence import SessionEvidence
-from calibrate.report.workspace.pictures import Measured, before_and_after
+from calibrate.report.workspace.pictures import MeasuredErrors, before_and_after
 from calibrate.report.workspace.workspace_errors import KnownArm, Room, target_at
 
 IN_SPACE = names_with(Trait.IN_SPACE)  # instruments that measure where the target is
@@ -35,7 +35,7 @@ Floats = NDArray[np.float64]
 ALONE = 1e-6  # of 1 - J C J': below, the observation alone determines something, and nothing else predicts it
 
 
-def session_measured(evidence: SessionEvidence, known: KnownArm) -> Measured | None:
+def session_measured(evidence: SessionEvidence, known: KnownArm) -> MeasuredErrors | None:
     """Errors at the poses, each predicted from all others; None where no instrument shows where the target is."""
     for index, name in enumerate(evidence.model.instruments):
         readings = next((r for r in evidence.readings if r.instrument == name and r.unit == "m"), None)
@@ -47,7 +47,7 @@ def session_measured(evidence: SessionEvidence, known: KnownArm) -> Measured | N
         found = np.linalg.norm(left[:, :3], axis=1)
         told = np.isfinite(found)
         points = target_at(known, known.theta, evidence.recording.samples.joints()[readings.rows[:, 0]])
-        return Measured(points[told], readings.error_before[told], found[told])
+        return MeasuredErrors(points[told], readings.error_before[told], found[told])
     return None
 
 
@@ -75,7 +75,7 @@ WORKSPACE_TITLE = "Error over the workspace"
 LEAD = "How far the tool is from where the controller thinks it is, wherever the arm can go."
 
 
-def workspace(room: Room | str, measured: Measured | None, why_not_measured: str) -> Html:
+def workspace(room: Room | str, measured: MeasuredErrors | None, why_not_measured: str) -> Html:
     """Pictures; or why there are none. `why_not_measured` is printed where `measured` is None."""
     if isinstance(room, str):
         return section("workspace", WORKSPACE_TITLE, LEAD, tag("p", f"Not drawn: {room}."))

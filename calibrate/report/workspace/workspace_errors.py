@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from calibrate.diagnose.record.schema import DiagnosisFile
 from calibrate.fit.accuracy import (
     FreeSpaceStatus,
-    Scatter,
+    PoseScatter,
     Workspace,
     free_space_error,
     target_by_parameter,
@@ -28,7 +28,7 @@ from calibrate.fit.rank import Identifiability, analyse_along, in_plain_words
 from calibrate.model.alignment import aligned_difference
 from calibrate.model.arms.rig_arm import limits_of
 from calibrate.model.chain import KinematicModel
-from calibrate.model.model_file import Covariance, Fields, FreeSpaceRecord
+from calibrate.model.model_file import Covariance, Fields, WorkspaceErrorRecord
 from calibrate.model.parameters import Parameter, index_of, without_assumed
 from calibrate.model.rigid import cross_matrix
 from calibrate.model.sensors.catalogue import LENGTHS
@@ -51,14 +51,14 @@ class KnownArm:
     theta: Floats  # (param,) as identified
     covariance: Floats  # (param, param), zero for what was held
     seen: Identifiability
-    scatter: Scatter  # of a single pose
+    scatter: PoseScatter  # of a single pose
     point_m: Floats  # (3,) the target in the flange frame, that the corrections of tool are about
     lower_rad: Floats  # (joint,) limits
     upper_rad: Floats
     q_rad: Floats  # (row, joint) of the samples that took part
 
 
-def unpredicted(room: FreeSpaceRecord | None) -> str | None:
+def unpredicted(room: WorkspaceErrorRecord | None) -> str | None:
     """Why errors over the workspace cannot be determined, by the prediction in the model; None where they can."""
     if room is None:
         return "the model holds no prediction: it has no covariance, or is of an older program"
@@ -67,12 +67,12 @@ def unpredicted(room: FreeSpaceRecord | None) -> str | None:
     return f"{room.says} ({'; '.join(room.undetermined)})" if room.undetermined else room.says
 
 
-def scatter_of(noise: Fields) -> Scatter:
+def scatter_of(noise: Fields) -> PoseScatter:
     """Of a single pose, from the noise found: of the joints, else of the instrument, in which that of the arm is."""
     found = {name: value for name, value in noise.items() if isinstance(value, float)}
     if JOINT in found:
-        return Scatter(joint_rad=found[JOINT])
-    return Scatter(target_m=max(found.get(source, 0.0) for source in LENGTHS))
+        return PoseScatter(joint_rad=found[JOINT])
+    return PoseScatter(target_m=max(found.get(source, 0.0) for source in LENGTHS))
 
 
 def whole_covariance(record: Covariance | None, parameters: tuple[Parameter, ...]) -> Floats:

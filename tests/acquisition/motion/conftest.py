@@ -7,7 +7,7 @@ import pytest
 
 from acquisition.recording.rig import load_rig
 from calibrate.model.arms.dh import DhArm, DhLink
-from calibrate.model.arms.link_tolerance import LinkBelief
+from calibrate.model.arms.link_tolerance import LinkTolerance
 from calibrate.model.arms.rig_arm import RigArm
 
 RIG = Path(__file__).parents[3] / "rigs" / "ur5e-dual-psd.toml"
@@ -27,7 +27,7 @@ IRB120_LOWER_RAD = np.radians([-165.0, -110.0, -110.0, -160.0, -120.0, -180.0])
 
 def irb120(error: float = 0.0) -> RigArm:
     """`error`: one sigma of every parameter, m and rad; 0 is the drawing."""
-    arm = DhArm(IRB120_ROWS, LinkBelief(3e-4, 5e-4))
+    arm = DhArm(IRB120_ROWS, LinkTolerance(3e-4, 5e-4))
     theta = error * np.random.default_rng(3).normal(size=len(arm.parameters))
     return RigArm.of(arm, theta, IRB120_LOWER_RAD, IRB120_UPPER_RAD)
 
@@ -40,7 +40,7 @@ def ur5e(error: float = 0.0) -> RigArm:
     rows = tuple(
         DhLink(j.theta_offset_rad or 0.0, j.d_m or 0.0, j.a_m or 0.0, j.alpha_rad or 0.0) for j in rig.arm.joints
     )
-    arm = DhArm(rows, LinkBelief(3e-4, 5e-4))
+    arm = DhArm(rows, LinkTolerance(3e-4, 5e-4))
     theta = error * np.random.default_rng(4).normal(size=len(arm.parameters))
     return RigArm.of(arm, theta, drawn.lower_rad, drawn.upper_rad)
 

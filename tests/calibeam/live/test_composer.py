@@ -11,7 +11,7 @@ from acquisition.recording.rig import Placement, Pose, load_rig
 from calibeam.live.composer import Composer
 from calibeam.live.feed import Progress
 from calibeam.live.health import Latest
-from calibrate.model.assumed_rig import BelievedRig
+from calibrate.model.assumed_rig import AssumedRig
 from drivers.device import Block
 
 RIGS = Path(__file__).parents[3] / "rigs"
@@ -46,10 +46,10 @@ def test_spots_and_beam_are_those_of_light_and_model(composer, living, rig, late
     living.send(0.0)
     told(composer.state())
     now = told(composer.now())
-    expected = BelievedRig(rig).expect(living.posture(0.0), 1, 1).spots_m
+    expected = AssumedRig(rig).expect(living.posture(0.0), 1, 1).spots_m
     shown = [now["faces"][k][name] for k in (0, 1) for name in ("x_m", "y_m")]
     assert shown == pytest.approx(expected + np.array([6e-4, -4e-4, -3e-4, 8e-4]), abs=2e-6)
-    by_joints = BelievedRig(rig).expect(np.array(now["q_rad"]), 1, 1).spots_m  # as told: with the noise of the encoders
+    by_joints = AssumedRig(rig).expect(np.array(now["q_rad"]), 1, 1).spots_m  # as told: with the noise of the encoders
     assert now["beam"]["spots_m"] == pytest.approx(by_joints, abs=2e-6)
     assert now["beam"]["both"] is True
     assert [face["state"] for face in now["faces"]] == ["light", "light"]
@@ -61,10 +61,10 @@ def test_the_beam_goes_from_the_laser_over_one_face_to_the_other(composer, livin
     living.send(0.0)
     told(composer.state())
     laser, first, second = (np.array(point) for point in told(composer.now())["beam"]["points_m"])
-    origin_m, direction = BelievedRig(rig).beam(living.posture(0.0))
+    origin_m, direction = AssumedRig(rig).beam(living.posture(0.0))
     assert laser == pytest.approx(origin_m, abs=2e-5)
     assert np.cross(first - laser, direction) == pytest.approx(0.0, abs=5e-5)
-    normal = BelievedRig(rig).T_base_psd1(1)[:3, 2]
+    normal = AssumedRig(rig).T_base_psd1(1)[:3, 2]
     inward, outward = first - laser, second - first
     mirrored = inward - 2.0 * (inward @ normal) * normal
     assert outward / np.linalg.norm(outward) == pytest.approx(mirrored / np.linalg.norm(mirrored), abs=2e-3)

@@ -16,9 +16,9 @@ from calibeam.prove.seal import Layout
 from calibrate.compare.comparison import ComparisonFile, DifferenceRecord
 from calibrate.diagnose.record.file import write_diagnosis
 from calibrate.diagnose.record.schema import (
-    BlunderRecord,
     DiagnosisFile,
     FindingRecord,
+    GrossErrorRecord,
     NotRecorded,
     RivalRecord,
     SizeRecord,
@@ -229,10 +229,10 @@ def test_a_part_of_the_cause_is_neither_its_name_nor_a_wrong_one(scored: Scored,
 
 def test_a_confused_convention_is_named_by_a_fault_of_the_file_that_says_so(scored: Scored, defect: MakeDefect) -> None:
     confused = defect("rig-convention", "arm.model", drivers=(), figures={})
-    fault = BlunderRecord("table", (), "", "the table seems to be in the other form of Denavit and Hartenberg")
+    fault = GrossErrorRecord("table", (), "", "the table seems to be in the other form of Denavit and Hartenberg")
     [named] = scored((confused,), confused=True, blunders=(fault,)).defects
     assert (named.located, named.named) == (True, True)
-    [other] = scored((confused,), confused=True, blunders=(BlunderRecord("degrees", (), "", "degrees"),)).defects
+    [other] = scored((confused,), confused=True, blunders=(GrossErrorRecord("degrees", (), "", "degrees"),)).defects
     assert not other.located
 
 
@@ -251,7 +251,7 @@ def test_a_few_rows_that_stood_elsewhere_locate_a_shift_of_their_time(
 ) -> None:
     shift = defect("base-moved", "base.pose", drivers=("t",), figures={"at_s": 70.0, "until_s": 80.0})
     left = UnexplainedRecord("", "time", 1e-5, 0.5, 1e-4, "rows 76 to 79 stood elsewhere")
-    shots = tuple(BlunderRecord("bad shot", (row,), "x_m", "far away") for row in rows)
+    shots = tuple(GrossErrorRecord("bad shot", (row,), "x_m", "far away") for row in rows)
     assert scored((shift,), unexplained=left, blunders=shots).defects[0].located is located
 
 

@@ -10,7 +10,7 @@ from acquisition.recording.rig import Rig, load_rig
 from acquisition.session.plan import PlanOptions, blocks
 from acquisition.session.records import Sample
 from calibeam.sessions.forecast import Ahead, ahead_of_blocks
-from calibrate.model.assumed_rig import BelievedRig
+from calibrate.model.assumed_rig import AssumedRig
 
 RIG_FILE = Path(__file__).parents[3] / "rigs" / "ur5e-dual-psd.toml"
 MEAN_OF = 200  # readings in a dwell: sigma of their mean
@@ -30,7 +30,7 @@ def ahead(rig: Rig) -> Ahead:
 @pytest.fixture(scope="session")
 def samples(rig: Rig, ahead: Ahead) -> list[Sample]:
     """Of every pose of the plan."""
-    rng, believed = np.random.default_rng(4), BelievedRig(rig)
+    rng, believed = np.random.default_rng(4), AssumedRig(rig)
     sigma_m = (rig.noise.psd_m or 0.0) / np.sqrt(MEAN_OF)
     out: list[Sample] = []
     for k, key in enumerate(ahead.keys):

@@ -15,7 +15,7 @@ from calibeam.simulation.replayed_recording import replay, write_replayed
 from calibeam.simulation.rig_in_numbers import arm_in_numbers
 from calibrate.apply.predicting import predict_with_physics
 from calibrate.errors import DataError
-from calibrate.model.effect_records import Effect, SessionRecord
+from calibrate.model.effect_records import EffectRecord, SessionRecord
 from calibrate.model.model_file import ModelFile, RigIdentity, write_model
 from calibrate.model.predict import Predictor
 from tests.calibeam.simulation.test_mechanism_laws import Bench, bench
@@ -25,7 +25,7 @@ FAMILIES = ("dual-psd", "tracker", "wire")
 MARGIN = 0.02  # of an effect: what a mechanism may differ by
 
 
-def effect(name: str, **fields: object) -> Effect:
+def effect(name: str, **fields: object) -> EffectRecord:
     """A linear effect of one coefficient."""
     usual = {
         "name": name,
@@ -38,7 +38,7 @@ def effect(name: str, **fields: object) -> Effect:
         "holds": "always",
         "range": {},
     }
-    return Effect(**{**usual, **fields})  # type: ignore[arg-type]
+    return EffectRecord(**{**usual, **fields})  # type: ignore[arg-type]
 
 
 SOFT = effect(
@@ -67,7 +67,7 @@ SLIPPED = effect(
 )
 
 
-def model_of(place: Bench, *effects: Effect) -> ModelFile:
+def model_of(place: Bench, *effects: EffectRecord) -> ModelFile:
     """The geometry of a session with these effects, as a diagnosis would have found them."""
     samples, rig = place.samples, place.predictor.rig
     kept = {c: tuple(v.tolist()) for c, v in samples.columns.items() if c[0] in "qtp" and c[-1] != "m"}

@@ -8,7 +8,7 @@ import pytest
 from calibrate.design.exchange import (
     CRITERIA,
     Determinant,
-    FreeSpace,
+    WorkspaceError,
     choose,
     exchange,
     one_by_one,
@@ -36,11 +36,11 @@ def test_a_saving_is_what_the_loss_becomes_less_by(information, name):
         assert savings[pose] == pytest.approx(less, rel=1e-4, abs=1e-9 * abs(criterion.loss(A)))
 
 
-@pytest.mark.parametrize("build", [FreeSpace, Determinant])
+@pytest.mark.parametrize("build", [WorkspaceError, Determinant])
 def test_exchanges_find_the_best_of_all_choices(build):
     rng = np.random.default_rng(5)
     rows = rng.normal(size=(9, 2, 4)) * rng.uniform(0.2, 3.0, (9, 1, 1))
-    more = (np.diag([1.0, 2.0, 3.0, 0.5]),) if build is FreeSpace else ()
+    more = (np.diag([1.0, 2.0, 3.0, 0.5]),) if build is WorkspaceError else ()
     criterion = build(rows, 0.1 * np.eye(4), *more)
     best = min(criterion.loss(known(criterion, some)) for some in combinations(range(9), 4))
     assert choose(criterion, 4, 9, rng).loss == pytest.approx(best)

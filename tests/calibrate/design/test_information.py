@@ -8,7 +8,7 @@ import pytest
 from calibrate.design.information import ALONG_M, POSES, target_of
 from calibrate.fit.identify.session import instruments_for_fit
 from calibrate.model.arms.catalogue import arm_of
-from calibrate.model.assumed_rig import believed_arm
+from calibrate.model.assumed_rig import assumed_arm
 
 LENGTH = ("link2.length", "link3.twist", "joint4.zero", "laser.tilt_u", "laser.shift_v")
 
@@ -24,7 +24,7 @@ def test_the_beam_moves_with_each_unknown_as_differences_say(rig, candidates):
     q = np.random.default_rng(3).uniform(*limits, (POSES, len(joints)))
 
     def beams(values):
-        arm = believed_arm(rig, values)
+        arm = assumed_arm(rig, values)
         each = [arm.beam(one) for one in q]
         return np.array([o for o, _ in each]), np.array([d for _, d in each])
 

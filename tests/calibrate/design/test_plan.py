@@ -10,7 +10,7 @@ from acquisition.recording.pose_plan import read_pose_plan, write_pose_plan
 from acquisition.recording.rig import load_rig
 from acquisition.session.session import check_planned
 from calibeam.motion.reachable_poses import candidates_of, with_grid
-from calibrate.design.design import Asked, design, enough_of
+from calibrate.design.design import DesignOptions, design, enough_of
 from calibrate.design.information import information_of
 from calibrate.design.places import choose_places
 from calibrate.design.seen import seen_by
@@ -20,7 +20,7 @@ from tests.calibrate.design.conftest import RIG
 
 @pytest.fixture(scope="module")
 def made(rig, candidates, information):
-    return design(rig, candidates, information, Asked(poses=36, repeats=4))
+    return design(rig, candidates, information, DesignOptions(poses=36, repeats=4))
 
 
 def test_a_session_can_take_the_plan(rig, made, tmp_path):
@@ -63,9 +63,9 @@ def test_the_plan_promises_less_error_than_random_poses(made):
 
 
 def test_expected_spots_are_those_of_the_rig_as_drawn(rig, candidates, made):
-    from calibrate.model.assumed_rig import BelievedRig
+    from calibrate.model.assumed_rig import AssumedRig
 
-    believed = BelievedRig(rig)
+    believed = AssumedRig(rig)
     for block in made.plan.block:
         for pose in block.pose:
             spots = believed.spots(np.array(pose.q_rad), block.placement, block.first_psd)
@@ -74,9 +74,9 @@ def test_expected_spots_are_those_of_the_rig_as_drawn(rig, candidates, made):
 
 def test_candidates_are_within_limits_above_the_table_and_lit(rig, candidates):
     from acquisition.centring.aim import clear_of_table
-    from calibrate.model.assumed_rig import BelievedRig, Light
+    from calibrate.model.assumed_rig import AssumedRig, Light
 
-    believed = BelievedRig(rig)
+    believed = AssumedRig(rig)
     for q, place, first in zip(candidates.q_rad, candidates.placement, candidates.first_psd, strict=True):
         assert believed.expect(q, int(place), int(first)).light is Light.BOTH_LIT
         assert clear_of_table(believed.arm, q)
@@ -128,9 +128,9 @@ def test_known_distances_between_places_never_harm(rig):
 @pytest.mark.parametrize(
     ("asked", "says"),
     [
-        (Asked(criterion="a"), "there are free-space, d, o1"),
-        (Asked(poses=500), "72 candidates for 500 poses"),
-        (Asked(poses=5, repeats=5), "more poses than repeats"),
+        (DesignOptions(criterion="a"), "there are free-space, d, o1"),
+        (DesignOptions(poses=500), "72 candidates for 500 poses"),
+        (DesignOptions(poses=5, repeats=5), "more poses than repeats"),
     ],
 )
 def test_what_cannot_be_designed_is_refused(rig, candidates, information, asked, says):
@@ -191,7 +191,7 @@ def test_poses_before_a_tracker_are_designed_too(rig):
     believed = offered.reading @ transform((0.0, 0.0, 0.0), (0.0, 0.0, 2.0))[:3, :3].T + [2.0, 0.5, 0.3]
     assert believed[:, 2].min() > 0.0
     found = information_of(tracked, offered, np.random.default_rng(2))
-    made = design(tracked, offered, found, Asked(poses=30, repeats=2))
+    made = design(tracked, offered, found, DesignOptions(poses=30, repeats=2))
     assert found.target == "the tool's point"
     assert made.free_space_m < made.random_m
     assert made.plan.block[0].placement is None

@@ -13,7 +13,7 @@ from calibrate.diagnose.record.to_file import file_of
 from calibrate.diagnose.state.fitted import fit_geometry
 from calibrate.diagnose.state.session import session_of
 from calibrate.diagnose.with_model.from_diagnosis import model_of_diagnosis
-from calibrate.model.checks.gross_error import BlunderKind
+from calibrate.model.checks.gross_error import GrossErrorKind
 from simulators.conceal.case import conceal
 from simulators.conceal.case_files import write_case
 from simulators.conceal.wanted import Wanted
@@ -74,7 +74,7 @@ def test_a_table_by_the_other_convention_of_denavit_and_hartenberg_is_named(tmp_
     write_case(conceal(Wanted("wire", 3, samples=80, confused=True)), tmp_path)
     recording = read(tmp_path / "recording")
     (fault,) = diagnose_samples(recording.rig, recording.samples, np.random.default_rng(1)).blunders
-    assert (fault.kind, fault.whole_file) == (BlunderKind.TABLE_CONVENTION, True)
+    assert (fault.kind, fault.whole_file) == (GrossErrorKind.TABLE_CONVENTION, True)
 
 
 def test_an_arm_that_stays_far_beside_its_readings_has_no_findings(recording):
@@ -85,7 +85,7 @@ def test_an_arm_that_stays_far_beside_its_readings_has_no_findings(recording):
     )
     found = diagnose_samples(recording.rig, mixed, np.random.default_rng(1))
     assert found.physics is None
-    assert found.blunders[-1].kind is BlunderKind.ANOTHER_ARM
+    assert found.blunders[-1].kind is GrossErrorKind.ANOTHER_ARM
     assert found.blunders[-1].whole_file
 
 

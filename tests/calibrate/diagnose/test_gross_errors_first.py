@@ -5,7 +5,7 @@ import pytest
 
 from calibrate.diagnose.gross_errors_first import blunders_first
 from calibrate.errors import DataError
-from calibrate.model.checks.gross_error import BlunderKind
+from calibrate.model.checks.gross_error import GrossErrorKind
 from tests.calibrate.diagnose.concealed import changed, recording_of
 
 
@@ -24,7 +24,7 @@ def test_a_wrong_digit_is_named_with_row_and_column(healthy):
     x = healthy.samples.column("x_m").copy()
     x[40] += 0.1
     (found,) = blunders_first(healthy.rig, changed(healthy.samples, x_m=x)).blunders
-    assert (found.kind, found.rows, found.column) == (BlunderKind.WRONG_VALUE, (40,), "x_m")
+    assert (found.kind, found.rows, found.column) == (GrossErrorKind.WRONG_VALUE, (40,), "x_m")
 
 
 def test_rows_left_out_are_counted_as_in_the_file(healthy):
@@ -32,7 +32,7 @@ def test_rows_left_out_are_counted_as_in_the_file(healthy):
     x[40] += 0.1
     twice = healthy.samples.take(np.sort(np.append(np.arange(120), 7)))
     (copy, wrong) = blunders_first(healthy.rig, changed(twice, x_m=np.insert(x, 8, x[7]))).blunders
-    assert (copy.kind, copy.rows) == (BlunderKind.DUPLICATED_ROWS, (8,))
+    assert (copy.kind, copy.rows) == (GrossErrorKind.DUPLICATED_ROWS, (8,))
     assert wrong.rows == (41,)
 
 
@@ -47,7 +47,7 @@ def test_a_session_joined_to_another_is_a_fault(healthy):
     y = healthy.samples.column("y_m").copy()
     y[90:] += 0.3
     found = blunders_first(healthy.rig, changed(healthy.samples, y_m=y)).blunders
-    assert {b.kind for b in found} == {BlunderKind.OTHER_SESSION}
+    assert {b.kind for b in found} == {GrossErrorKind.OTHER_SESSION}
     assert {row for b in found for row in b.rows} == set(range(90, 120))
 
 
@@ -55,7 +55,7 @@ def test_a_joint_counted_the_other_way_round_makes_the_whole_file_wrong(healthy)
     turned = changed(healthy.samples, q3_rad=-healthy.samples.column("q3_rad"))
     cleared = blunders_first(healthy.rig, turned)
     assert cleared.whole_file
-    assert cleared.blunders[0].kind is BlunderKind.JOINT_SIGN
+    assert cleared.blunders[0].kind is GrossErrorKind.JOINT_SIGN
     assert "q3" in cleared.blunders[0].column
 
 

@@ -12,9 +12,9 @@ from calibrate.error_simulation.machine import (
 )
 from calibrate.error_simulation.monte_carlo import CHUNK, count_chunk
 from calibrate.error_simulation.sources import (
+    ErrorSource,
     Law,
-    Source,
-    Term,
+    SourceTerm,
     Wave,
 )
 
@@ -28,7 +28,7 @@ def test_normal_columns_are_normal_and_independent():
 
 
 def test_a_phased_source_is_its_size_at_a_phase_anywhere_in_the_turn():
-    source = Source("one", "group", "rad", Law("constant", 2.0), (Term(6, wave=Wave(0, 1.0)),))
+    source = ErrorSource("one", "group", "rad", Law("constant", 2.0), (SourceTerm(6, wave=Wave(0, 1.0)),))
     x = columns_of([source]).draw(np.random.default_rng(1), 20_000)
     np.testing.assert_allclose(np.hypot(x[0], x[1]), 2.0, rtol=1e-14)
     assert stats.kstest(np.arctan2(x[1], x[0]) / (2.0 * np.pi) + 0.5, "uniform").pvalue > 1e-3

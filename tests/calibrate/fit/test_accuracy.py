@@ -19,7 +19,7 @@ from calibrate.fit.accuracy import (
     ALARM_P,
     Alarm,
     FreeSpaceStatus,
-    Scatter,
+    PoseScatter,
     Workspace,
     against_repeats,
     against_stated,
@@ -164,7 +164,11 @@ def test_scatter_of_a_pose_adds_in_squares(fitted):
         found = free_space_error(one.model, one.fit, one.seen, ROOM, np.random.default_rng(0), scatter)
         return found.rms_m
 
-    alone, of_target, of_joints = rms_m(Scatter()), rms_m(Scatter(target_m=2e-5)), rms_m(Scatter(joint_rad=1e-5))
+    alone, of_target, of_joints = (
+        rms_m(PoseScatter()),
+        rms_m(PoseScatter(target_m=2e-5)),
+        rms_m(PoseScatter(joint_rad=1e-5)),
+    )
     assert of_target == pytest.approx(np.hypot(alone, np.sqrt(3.0) * 2e-5), rel=1e-9)
     assert 5e-6 < np.sqrt(of_joints**2 - alone**2) < 3e-5  # 10 urad at an arm of 0.9 m, six joints
 

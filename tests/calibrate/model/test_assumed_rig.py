@@ -7,7 +7,7 @@ import pytest
 from acquisition.recording.rig import ArmModel, load_rig
 from calibrate.errors import DataError
 from calibrate.model.arms.convert import convert
-from calibrate.model.assumed_rig import BelievedRig, Light
+from calibrate.model.assumed_rig import AssumedRig, Light
 from calibrate.model.dual_psd_rig import dual_psd_chain
 from calibrate.model.parameters import start_values
 
@@ -25,7 +25,7 @@ def corrected(request, rig, sessions):
     chain = dual_psd_chain(rig, session.placement, session.first_psd)
     theta = start_values(chain.parameters) + np.random.default_rng(0).normal(0, 2e-3, len(chain.parameters))
     values = dict(zip([p.name for p in chain.parameters], theta, strict=True))
-    return session, chain, theta, BelievedRig(rig, values)
+    return session, chain, theta, AssumedRig(rig, values)
 
 
 def test_expected_spots_and_joint_derivative_are_those_of_the_fit(corrected):
@@ -42,7 +42,7 @@ def test_expected_spots_and_joint_derivative_are_those_of_the_fit(corrected):
 
 def test_nominal_rig_follows_the_ray_and_lights_both_faces(rig, sessions, ur5e_exact):
     session = sessions(32, n=20, truth=None)
-    believed = BelievedRig(rig)
+    believed = AssumedRig(rig)
     angles = session.q_rad + session.truth.zeros
     for q, place, first in zip(angles, session.placement, session.first_psd, strict=True):
         expected = believed.expect(q, int(place), int(first))
@@ -51,7 +51,7 @@ def test_nominal_rig_follows_the_ray_and_lights_both_faces(rig, sessions, ur5e_e
 
 
 def test_light_says_both_lit_beside_the_face_and_wrong_way(rig):
-    believed = BelievedRig(rig)
+    believed = AssumedRig(rig)
     fixture = believed.fixture
     for first in (1, 2):
         point, direction = fixture.line(np.zeros(4), first)
@@ -63,7 +63,7 @@ def test_light_says_both_lit_beside_the_face_and_wrong_way(rig):
 
 
 def test_a_line_for_given_spots_gives_those_spots(rig):
-    fixture = BelievedRig(rig).fixture
+    fixture = AssumedRig(rig).fixture
     rng = np.random.default_rng(1)
     for first in (1, 2):
         for spots in rng.uniform(-8e-3, 8e-3, (10, 4)):
@@ -98,10 +98,10 @@ def test_the_flange_is_that_of_the_arm(corrected):
 
 
 def test_unknown_names_are_refused(rig):
-    believed = BelievedRig(rig)
+    believed = AssumedRig(rig)
     with pytest.raises(DataError, match=r"placement 7 is not in the rig \(known: 1, 2, 3\)"):
         believed.spots(np.zeros(6), 7, 1)
     with pytest.raises(DataError, match="first_psd 3"):
         believed.spots(np.zeros(6), 1, 3)
     with pytest.raises(KeyError, match=r"joint9\.zero"):
-        BelievedRig(rig, {"joint9.zero": 0.1})
+        AssumedRig(rig, {"joint9.zero": 0.1})

@@ -9,7 +9,7 @@ from acquisition.recording.rig import load_rig, rig_sha256, rig_text
 from calibrate.errors import DataError
 from calibrate.fit.identify.identify import identify
 from calibrate.fit.identify.record import record_of
-from calibrate.model.assumed_rig import BelievedRig
+from calibrate.model.assumed_rig import AssumedRig
 from calibrate.model.model_file import (
     RigIdentity,
     corrections,
@@ -69,7 +69,7 @@ def test_the_file_names_rig_software_rank_noise_and_proof(written):
 
 def test_corrections_of_the_file_predict_the_spots(identified, written):
     session, rig, _ = identified
-    believed = BelievedRig(rig, corrections(read_model(written[0])))
+    believed = AssumedRig(rig, corrections(read_model(written[0])))
     rows = zip(session.q_rad, session.placement, session.first_psd, strict=True)
     predicted = np.array([believed.spots(q, int(place), int(first)) for q, place, first in rows])
     assert np.sqrt(np.mean((predicted - session.spots_m) ** 2)) < 5e-6

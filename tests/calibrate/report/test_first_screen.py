@@ -14,7 +14,7 @@ from calibrate.report.elements.verdict import (
     Answers,
     Number,
     Trust,
-    Verdict,
+    VerdictBox,
     first_screen,
 )
 from calibrate.report.evidence.session_evidence import session_evidence
@@ -65,7 +65,7 @@ class Letters(HTMLParser):
 @pytest.mark.parametrize("trust", list(Trust))
 def test_trust_is_told_by_mark_and_word_not_by_colour_alone(trust):
     number = Number("now", "Identified", 1e-4, "m", "100 µm", "rms")
-    page = first_screen(Answers(Verdict(trust, "It is so.", ("because",), ("do it",)), (number, number, number)))
+    page = first_screen(Answers(VerdictBox(trust, "It is so.", ("because",), ("do it",)), (number, number, number)))
     assert all(question in page for question in QUESTIONS)
     assert all(part in page for part in MARKS[trust])
     assert "because" in page
@@ -108,7 +108,7 @@ def test_no_letter_of_a_figure_is_smaller_than_seven_points_on_paper(session_htm
 def test_a_session_ends_with_one_number_and_what_limits_it(limit, ends):
     tool = [Number(f"tool_{k}", k, 1e-4, "m", said, "") for k, said in (("nominal", "9 mm"), ("calibrated", "4 µm"))]
     other = Number("now", "unseen", 1e-5, "m", "5 µm", "")
-    said = accuracy_of(Answers(Verdict(Trust.CARE, "It is so.", (), ()), (*tool, other), limit=limit))
+    said = accuracy_of(Answers(VerdictBox(Trust.CARE, "It is so.", (), ()), (*tool, other), limit=limit))
     assert "4 µm" in said
     assert "5 µm" not in said
     assert said.endswith(ends)

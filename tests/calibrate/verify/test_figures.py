@@ -12,9 +12,9 @@ from acquisition.recording.rig.schema import PermissibleErrors
 from calibrate.errors import DataError
 from calibrate.verify import standards
 from calibrate.verify.measured_lengths import (
+    BallPlaces,
     Judgement,
     Length,
-    Measured,
     measured,
 )
 from calibrate.verify.verify import Verification
@@ -31,7 +31,7 @@ def ball(count, diameter_m, middle=(0.6, -0.15, 0.2), seed=1):
 
 def holding(seats=None, touches=None, lengths=(), mpe=None):
     rig = RIG if mpe is None else msgspec.structs.replace(RIG, mpe=mpe)
-    return Measured(rig, seats or {}, touches or {}, tuple(lengths))
+    return BallPlaces(rig, seats or {}, touches or {}, tuple(lengths))
 
 
 def by_symbol(figures):

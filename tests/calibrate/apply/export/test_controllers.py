@@ -14,7 +14,7 @@ from calibeam.cli import run
 from calibrate.apply.export.export import export_model, form_named
 from calibrate.apply.export.robot_description import SPRING
 from calibrate.apply.predicting import flange_with_physics
-from calibrate.model.effect_records import Effect, EffectParameter, SessionRecord
+from calibrate.model.effect_records import EffectParameter, EffectRecord, SessionRecord
 from calibrate.model.model_file import (
     Covariance,
     ModelParameter,
@@ -35,7 +35,7 @@ def of_make(make, text=RIG, **changes):
 def soft(joint):
     """A joint that yields in proportion to its torque, found in a session over the whole range."""
     name = f"joint{joint}-compliance"
-    effect = Effect(
+    effect = EffectRecord(
         name=name,
         where=f"joint{joint}.angle",
         physics="joint-compliance",

@@ -6,7 +6,7 @@ import pytest
 from acquisition.recording.errors import MESSAGE_LENGTH
 from acquisition.recording.files import brief
 from calibrate.fit.gross_errors.conventions import wrong_convention
-from calibrate.model.checks.gross_error import BlunderKind
+from calibrate.model.checks.gross_error import GrossErrorKind
 from calibrate.model.sensors.position import PositionWitness
 from tests.calibrate.fit.gross_errors.conftest import NOISE, POINT, flange
 
@@ -49,7 +49,7 @@ def judged(q, position_m, point=POINT):
 def test_a_kuka_is_named_by_its_joints_and_not_by_a_left_handed_tracker(point):
     q, position_m = session(point)
     found = judged(counted(q, 1, 4, 6), position_m, point)
-    assert (found.kind, found.column) == (BlunderKind.JOINT_SIGN, "columns q1_rad, q4_rad, q6_rad")
+    assert (found.kind, found.column) == (GrossErrorKind.JOINT_SIGN, "columns q1_rad, q4_rad, q6_rad")
     assert "joints 1, 4 and 6 turn against the rig's sense" in found.says
     assert found.remedy == "in the rig file, write sign = -1 for joints 1, 4 and 6, as for KUKA, or remove it there"
     assert found.says.endswith(found.remedy)  # a terminal cuts long messages in the middle
@@ -71,7 +71,7 @@ def test_a_negated_column_is_all_there_is_where_no_joint_signs_fit():
     T = flange(q)  # a UR5, whose links stand beside each other: no signs mirror it
     position_m = (T[:, :3, :3] @ POINT + T[:, :3, 3]) * [-1, 1, 1]
     found = wrong_convention(flange, [PositionWitness(q, position_m, POINT)])
-    assert found.kind is BlunderKind.MIRRORED_AXIS
+    assert found.kind is GrossErrorKind.MIRRORED_AXIS
     assert "no set of joint signs explains it" in found.says
     assert "no instrument is left-handed" in found.says
 

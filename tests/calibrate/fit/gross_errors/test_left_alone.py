@@ -4,15 +4,15 @@ import numpy as np
 
 from acquisition.recording import Samples
 from calibrate.fit.gross_errors.bad_rows import left_alone
-from calibrate.model.checks.gross_error import Blunder, BlunderKind
+from calibrate.model.checks.gross_error import GrossError, GrossErrorKind
 
 
 def samples(n, **columns):
     return Samples({"t_s": np.arange(n, dtype=float), "q1_rad": np.zeros(n), **columns}, 1)
 
 
-def bad(*rows, kind=BlunderKind.BAD_SHOT):
-    return Blunder(kind, rows, "x_m", "far away", "remove it")
+def bad(*rows, kind=GrossErrorKind.BAD_SHOT):
+    return GrossError(kind, rows, "x_m", "far away", "remove it")
 
 
 def bars(ends, first, n=20):
@@ -23,7 +23,7 @@ def bars(ends, first, n=20):
 
 def test_the_other_end_of_a_bar_goes_along():
     (found,) = left_alone(bars("abbaab", 11), [bad(12)])
-    assert (found.kind, found.rows) == (BlunderKind.LEFT_ALONE, (11,))
+    assert (found.kind, found.rows) == (GrossErrorKind.LEFT_ALONE, (11,))
     assert found.says.startswith("row 12, bar_end: the other end of this bar, row 13, is left out")
 
 
@@ -33,15 +33,15 @@ def test_both_ends_named_leave_nobody_alone():
 
 def test_a_copied_end_does_not_shift_the_pairs_behind_it():
     copied = bars("abbab", 10)  # row 12 repeats row 11
-    assert left_alone(copied, [bad(12, kind=BlunderKind.DUPLICATED_ROWS)]) == ()
-    (found,) = left_alone(copied, [bad(12, kind=BlunderKind.DUPLICATED_ROWS), bad(13)])
+    assert left_alone(copied, [bad(12, kind=GrossErrorKind.DUPLICATED_ROWS)]) == ()
+    (found,) = left_alone(copied, [bad(12, kind=GrossErrorKind.DUPLICATED_ROWS), bad(13)])
     assert found.rows == (14,)
 
 
 def test_the_last_row_of_a_cone_goes_along_and_two_stay():
     seats = samples(8, seat=np.array([1, 1, 2, 2, 2, np.nan, 3, 3], dtype=float))
     (found,) = left_alone(seats, [bad(0), bad(3)])
-    assert (found.kind, found.rows, found.column) == (BlunderKind.LEFT_ALONE, (1,), "seat")
+    assert (found.kind, found.rows, found.column) == (GrossErrorKind.LEFT_ALONE, (1,), "seat")
 
 
 def test_an_end_that_was_in_a_cone_takes_the_other_row_of_the_cone_with_it():

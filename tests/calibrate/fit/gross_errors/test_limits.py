@@ -4,7 +4,7 @@ import numpy as np
 
 from acquisition.recording import Samples
 from calibrate.fit.gross_errors.bad_rows import rows_beyond_limits
-from calibrate.model.checks.gross_error import BlunderKind
+from calibrate.model.checks.gross_error import GrossErrorKind
 
 LIMITS = np.array([[-2.0, 2.0], [-1.0, 3.0]])
 
@@ -17,7 +17,7 @@ def test_a_typed_digit_beyond_the_range_names_row_column_and_range():
     q = np.zeros((40, 2))
     q[7, 1] = 5.5
     (found,) = rows_beyond_limits(samples(q), LIMITS)
-    assert (found.kind, found.rows, found.column) == (BlunderKind.BEYOND_LIMITS, (7,), "q2_rad")
+    assert (found.kind, found.rows, found.column) == (GrossErrorKind.BEYOND_LIMITS, (7,), "q2_rad")
     assert found.says.startswith("row 8, q2_rad: 5.5 rad is not within -1 to 3")
 
 

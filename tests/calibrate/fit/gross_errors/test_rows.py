@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from calibrate.fit.gross_errors.bad_rows import bad_rows
-from calibrate.model.checks.gross_error import BlunderKind
+from calibrate.model.checks.gross_error import GrossErrorKind
 from calibrate.model.checks.rough_fit import rows_of_another_session, sessions_apart
 from tests.calibrate.fit.gross_errors.conftest import NOISE, POINT, flange
 
@@ -28,7 +28,7 @@ def test_a_typed_digit_in_a_reading_names_row_column_and_what_it_should_be(scene
     meant = scene.position_m[30, column]
     scene.position_m[30, column] += 0.02
     (found,) = bad_rows(scene.shots())
-    assert (found.kind, found.rows) == (BlunderKind.WRONG_VALUE, (30,))
+    assert (found.kind, found.rows) == (GrossErrorKind.WRONG_VALUE, (30,))
     assert found.column == ("x_m", "y_m", "z_m")[column]
     assert found.says.startswith(f"row 31, {found.column}: reads")
     assert float(found.what.split("about ")[1].split()[0]) == pytest.approx(meant, abs=1e-4)
@@ -39,7 +39,7 @@ def test_a_typed_digit_in_a_reading_names_row_column_and_what_it_should_be(scene
 def test_a_typed_digit_in_an_angle_names_the_joint(scene, joint, off):
     scene.q_rad[64, joint - 1] += off
     (found,) = bad_rows(scene.shots())
-    assert (found.kind, found.rows, found.column) == (BlunderKind.WRONG_VALUE, (64,), f"q{joint}_rad")
+    assert (found.kind, found.rows, found.column) == (GrossErrorKind.WRONG_VALUE, (64,), f"q{joint}_rad")
 
 
 def test_an_angle_whole_turns_off_is_given_back_within_one_turn(scene):
@@ -53,7 +53,7 @@ def test_an_angle_whole_turns_off_is_given_back_within_one_turn(scene):
 def test_a_bad_shot_is_said_with_its_distance(scene):
     scene.position_m[12] += [0.004, -0.007, 0.005]
     (found,) = bad_rows(scene.shots())
-    assert (found.kind, found.rows) == (BlunderKind.BAD_SHOT, (12,))
+    assert (found.kind, found.rows) == (GrossErrorKind.BAD_SHOT, (12,))
     assert float(found.what.split(" mm")[0]) == pytest.approx(np.sqrt(90.0), abs=0.1)
 
 
@@ -77,7 +77,7 @@ def test_a_block_of_another_session_is_named_by_its_frame(scene, turn, shift):
     rows = slice(70, 95)
     scene.position_m[rows] = Rotation.from_rotvec(turn).apply(scene.position_m[rows]) + shift
     (found,) = rows_of_another_session(scene.shots())
-    assert found.kind is BlunderKind.OTHER_SESSION
+    assert found.kind is GrossErrorKind.OTHER_SESSION
     assert found.rows == tuple(range(70, 95))
     assert found.says.startswith("rows 71-95, x_m, y_m, z_m: positions in another device frame")
 
@@ -88,7 +88,7 @@ def test_another_session_is_seen_before_any_fit_by_the_arm_as_drawn(scene, rows)
     scene.position_m[rows] = elsewhere + np.array([0.5, 0.0, 0.1])
     every = np.arange(10, 130)
     (found,) = sessions_apart(flange(scene.q_rad), scene.position_m, POINT, every)
-    assert found.kind is BlunderKind.OTHER_SESSION
+    assert found.kind is GrossErrorKind.OTHER_SESSION
     assert found.rows == tuple(every[rows].tolist())
 
 

@@ -8,7 +8,7 @@ from acquisition.recording.rig import load_rig
 from calibrate.errors import DataError
 from calibrate.fit.identify.clean import mirrored_axes
 from calibrate.fit.identify.identify import refuse_wrong_file
-from calibrate.model.checks.gross_error import BlunderKind
+from calibrate.model.checks.gross_error import GrossErrorKind
 
 SPOTS = ("psd1_x_m", "psd1_y_m", "psd2_x_m", "psd2_y_m")
 
@@ -39,7 +39,7 @@ def mirrored(lit, *axes):
 )
 def test_every_axis_is_named_by_its_column(rig, lit, axes):
     found = mirrored_axes(rig, mirrored(lit, *axes))
-    assert found.kind is BlunderKind.MIRRORED_AXIS
+    assert found.kind is GrossErrorKind.MIRRORED_AXIS
     assert found.column == f"column {', '.join(SPOTS[i] for i in axes)}"
 
 

@@ -7,7 +7,7 @@ from acquisition.recording import Samples
 from acquisition.recording.rig import load_rig
 from calibrate.fit.gross_errors.conventions import wrong_convention
 from calibrate.model.arms.catalogue import arm_of
-from calibrate.model.checks.gross_error import BlunderKind
+from calibrate.model.checks.gross_error import GrossErrorKind
 from calibrate.model.parameters import start_values
 from calibrate.model.sensors.catalogue import witnesses_of
 from calibrate.model.sensors.spots import SpotsWitness
@@ -57,13 +57,13 @@ def test_the_true_arm_is_hardly_strained_and_its_fixtures_stand_where_they_are(r
 
 def test_exchanged_detectors_are_named(rig, lit):
     found = wrong_convention(drawn(rig), [heard(rig, lit, first_psd=3.0 - lit.first_psd)])
-    assert (found.kind, found.column) == (BlunderKind.EXCHANGED_PSD, "column first_psd")
+    assert (found.kind, found.column) == (GrossErrorKind.EXCHANGED_PSD, "column first_psd")
 
 
 def test_spots_in_millimetres_are_named(rig, lit):
     columns = {name: 1e3 * spot for name, spot in zip(SPOTS, lit.spots_m.T, strict=True)}
     found = wrong_convention(drawn(rig), [heard(rig, lit, **columns)])
-    assert found.kind is BlunderKind.MILLIMETRES
+    assert found.kind is GrossErrorKind.MILLIMETRES
     assert "psd1_x_m" in found.says
 
 

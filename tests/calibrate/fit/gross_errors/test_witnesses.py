@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from calibrate.fit.gross_errors.conventions import wrong_convention
-from calibrate.model.checks.gross_error import BlunderKind
+from calibrate.model.checks.gross_error import GrossErrorKind
 from calibrate.model.sensors.bar import BarWitness
 from calibrate.model.sensors.full_pose import OrientationWitness
 from calibrate.model.sensors.position import PositionWitness
@@ -76,7 +76,7 @@ def test_orientations_see_the_last_joint_which_positions_of_a_target_on_its_axis
 def test_orientations_the_other_way_round_are_named(scene):
     one = orientations(scene, scene.q_rad)
     found = wrong_convention(flange, [OrientationWitness(scene.q_rad, -one.rotation_rad)])
-    assert found.kind is BlunderKind.INVERTED_ROTATION
+    assert found.kind is GrossErrorKind.INVERTED_ROTATION
     assert "rx_rad" in found.says
 
 
@@ -87,7 +87,7 @@ def test_millimetres_are_named(scene, witness):
     if isinstance(one, WireWitness):
         one = WireWitness(one.q_rad, 1e3 * one.length_m, one.point_m, one.drum_m)
     found = wrong_convention(flange, [one])
-    assert found.kind is BlunderKind.MILLIMETRES
+    assert found.kind is GrossErrorKind.MILLIMETRES
     assert "write metres" in found.says
 
 

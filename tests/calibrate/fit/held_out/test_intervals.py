@@ -7,7 +7,7 @@ import pytest
 
 from acquisition.recording.rig import load_rig
 from benchmarks.intervals import intervals
-from calibrate.fit.identify.point_constraint import BOUND_RAD, Form, PointConstraint
+from calibrate.fit.identify.point_constraint import BOUND_RAD, Constraint, PointConstraint
 from calibrate.fit.rank.identifiability import analyse
 from calibrate.fit.rank.observability import Redundant, reduced
 from calibrate.fit.solvers import Status, solve
@@ -65,7 +65,7 @@ def test_the_papers_joints_at_the_bound_are_no_result_and_silence_the_others(req
         for p in arm.parameters + laser.parameters
     )
     q_rad, first = session.q_rad[rows], session.first_psd[rows]
-    problem = PointConstraint(arm, laser, q_rad, first, 5e-6, Form.PAIR_POINTS, listed)
+    problem = PointConstraint(arm, laser, q_rad, first, 5e-6, Constraint.PAIR_POINTS, listed)
     seen = analyse(problem.jacobian(np.zeros(len(listed))), listed)
     fit = solve(replace(problem, parameters=hold(listed, (c.representative for c in seen.combinations))))
     assert fit.status is Status.AT_BOUND

@@ -7,7 +7,7 @@ from scipy.spatial.transform import Rotation
 from acquisition.recording import Samples
 from calibrate.errors import DataError
 from calibrate.fit.identify.identify import identify
-from calibrate.model.checks.gross_error import BlunderKind
+from calibrate.model.checks.gross_error import GrossErrorKind
 from tests.calibrate.fit.identify.conftest import Session, changed, table
 
 POSITION = ("x_m", "y_m", "z_m")
@@ -44,7 +44,7 @@ def test_a_typed_digit_is_named_and_changes_nothing(rig, samples, clean):
     y[33] += 0.1
     result = run(rig, changed(samples, y_m=y))
     (found,) = result.blunders
-    assert (found.kind, found.rows, found.column) == (BlunderKind.WRONG_VALUE, (33,), "y_m")
+    assert (found.kind, found.rows, found.column) == (GrossErrorKind.WRONG_VALUE, (33,), "y_m")
     assert result.n_samples == 149
     assert result.instruments[0].rms_distance_after_m == pytest.approx(
         clean.instruments[0].rms_distance_after_m, rel=0.05
@@ -59,10 +59,10 @@ def test_several_kinds_at_once_are_each_named(rig, samples):
     copied = Samples({k: np.concatenate([v, v[20:22]]) for k, v in both.columns.items()}, 6)
     found = {(b.kind, b.rows) for b in run(rig, copied).blunders}
     assert found == {
-        (BlunderKind.WRONG_VALUE, (5,)),
-        (BlunderKind.WRONG_VALUE, (80,)),
-        (BlunderKind.DUPLICATED_ROWS, (150,)),
-        (BlunderKind.DUPLICATED_ROWS, (151,)),
+        (GrossErrorKind.WRONG_VALUE, (5,)),
+        (GrossErrorKind.WRONG_VALUE, (80,)),
+        (GrossErrorKind.DUPLICATED_ROWS, (150,)),
+        (GrossErrorKind.DUPLICATED_ROWS, (151,)),
     }
 
 
@@ -70,7 +70,7 @@ def test_several_kinds_at_once_are_each_named(rig, samples):
 def test_rows_of_another_session_are_one_blunder(rig, samples, turn, shift):
     result = run(rig, moved(samples, slice(40, 80), turn, shift))
     rows = {row for b in result.blunders for row in b.rows}
-    assert {b.kind for b in result.blunders} == {BlunderKind.OTHER_SESSION}
+    assert {b.kind for b in result.blunders} == {GrossErrorKind.OTHER_SESSION}
     assert rows == set(range(40, 80))
     assert result.instruments[0].rms_distance_after_m < 2.5e-5
 
@@ -80,7 +80,7 @@ def test_bad_rows_after_a_copied_one_keep_their_numbers(rig, samples):
     z = doubled.column("z_m").copy()
     z[100] += 0.05
     found = {b.kind: b.rows for b in run(rig, changed(doubled, z_m=z)).blunders}
-    assert found == {BlunderKind.DUPLICATED_ROWS: (3,), BlunderKind.WRONG_VALUE: (100,)}
+    assert found == {GrossErrorKind.DUPLICATED_ROWS: (3,), GrossErrorKind.WRONG_VALUE: (100,)}
 
 
 def test_half_a_file_of_another_session_is_refused(rig, samples):

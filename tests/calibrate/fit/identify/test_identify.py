@@ -9,7 +9,7 @@ from calibrate.errors import DataError
 from calibrate.fit.accuracy import Alarm
 from calibrate.fit.identify.identify import identify
 from calibrate.fit.solvers import Status
-from calibrate.model.checks.gross_error import BlunderKind
+from calibrate.model.checks.gross_error import GrossErrorKind
 from calibrate.model.predict import Predictor, predict
 from tests.calibrate.fit.identify.conftest import BAR_M, Session, table
 
@@ -132,7 +132,7 @@ def test_a_cone_that_is_left_with_one_row_goes_too_and_both_rows_are_named(rig, 
     q[-2, 3] = 9.0
     result = run(rig, table(q, seat=seat), held_out_share=0.0)
     found = [(b.kind, b.rows) for b in result.blunders]
-    assert found == [(BlunderKind.BEYOND_LIMITS, (len(q) - 2,)), (BlunderKind.LEFT_ALONE, (len(q) - 1,))]
+    assert found == [(GrossErrorKind.BEYOND_LIMITS, (len(q) - 2,)), (GrossErrorKind.LEFT_ALONE, (len(q) - 1,))]
     assert not any(p.name.startswith("seat3") for p in result.parameters)
     assert result.n_samples == len(q) - 2
 

@@ -7,8 +7,8 @@ from acquisition.recording.rig import load_rig
 from calibrate.errors import DataError
 from calibrate.fit.identify.point_constraint import (
     BOUND_RAD,
+    Constraint,
     DrawingDoubt,
-    Form,
     PointConstraint,
     drawing_doubt,
     identify_by_four_poses,
@@ -90,7 +90,7 @@ def test_a_zero_at_its_bound_silences_the_whole_answer(rig, sessions, ur5e_exact
     assert any("bound" in str(zero.why) for zero in result.zeros)
 
 
-@pytest.mark.parametrize("form", list(Form))
+@pytest.mark.parametrize("form", list(Constraint))
 def test_derivatives_are_differences(rig, exact, form):
     arm, laser = arm_of(rig), laser_of(rig)
     data = centred(exact, 2)

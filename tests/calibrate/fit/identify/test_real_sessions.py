@@ -13,7 +13,7 @@ from calibrate.fit.identify.identify import identify
 from calibrate.fit.identify.rounds import settled_fit
 from calibrate.fit.identify.session import instruments_for_fit
 from calibrate.fit.solvers import solve
-from calibrate.model.checks.gross_error import BlunderKind
+from calibrate.model.checks.gross_error import GrossErrorKind
 from calibrate.model.parameters import hold, plausible_sizes
 from tests.calibrate.fit.identify.conftest import changed
 
@@ -118,8 +118,8 @@ def test_blunders_made_in_the_ur5_session_are_found_and_no_others(real):
     xyz[600:700, 0] += 0.003
     result = run(recording, changed(made, **dict(zip(POSITION, xyz.T, strict=True))))
     assert {(b.kind, b.column, b.rows) for b in result.blunders} == {
-        (BlunderKind.WRONG_VALUE, "x_m", (100,)),
-        (BlunderKind.WRONG_VALUE, "q3_rad", (500,)),
-        (BlunderKind.OTHER_SESSION, "x_m, y_m, z_m", tuple(range(600, 700))),
+        (GrossErrorKind.WRONG_VALUE, "x_m", (100,)),
+        (GrossErrorKind.WRONG_VALUE, "q3_rad", (500,)),
+        (GrossErrorKind.OTHER_SESSION, "x_m, y_m, z_m", tuple(range(600, 700))),
     }
     assert result.instruments[0].rms_distance_after_m < 0.115e-3

@@ -8,7 +8,7 @@ from acquisition.recording.rig import load_rig
 from calibrate.errors import DataError
 from calibrate.fit.fit_plan import FitPlan
 from calibrate.fit.identify.identify import identify, without_blunders
-from calibrate.model.checks.gross_error import BlunderKind
+from calibrate.model.checks.gross_error import GrossErrorKind
 from tests.calibrate.conftest import spot_samples
 from tests.calibrate.fit.identify.conftest import changed
 
@@ -36,7 +36,7 @@ def test_a_typed_digit_is_named_by_row_and_column(rig, samples, column, off):
     values = samples.column(column).copy()
     values[17] += off
     weighting, _, (found,) = without_blunders(rig, changed(samples, **{column: values}))
-    assert (found.kind, found.rows) == (BlunderKind.WRONG_VALUE, (17,))
+    assert (found.kind, found.rows) == (GrossErrorKind.WRONG_VALUE, (17,))
     assert found.column == column
     assert weighting.measured[0].problem.rows == len(samples) - 1
 
@@ -47,8 +47,8 @@ def test_a_copied_row_is_left_out_and_later_rows_keep_their_numbers(rig, samples
     x[40] += 2e-3
     _, _, blunders = without_blunders(rig, changed(doubled, psd1_x_m=x))
     assert {(b.kind, b.rows) for b in blunders} == {
-        (BlunderKind.DUPLICATED_ROWS, (5,)),
-        (BlunderKind.WRONG_VALUE, (40,)),
+        (GrossErrorKind.DUPLICATED_ROWS, (5,)),
+        (GrossErrorKind.WRONG_VALUE, (40,)),
     }
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from acquisition.recording.rig import load_rig
-from calibrate.fit.identify.point_constraint import BOUND_RAD, Form, PointConstraint
+from calibrate.fit.identify.point_constraint import BOUND_RAD, Constraint, PointConstraint
 from calibrate.fit.rank.identifiability import analyse, in_words, plainly
 from calibrate.fit.rank.observability import Redundant, analyse_along, observability, reduced
 from calibrate.fit.solvers import Status, solve
@@ -210,7 +210,9 @@ def four_poses(request, sessions, ur5e_exact):
         else Parameter(p.name, p.unit, p.plausible, free=False)
         for p in arm.parameters + laser.parameters
     )
-    return PointConstraint(arm, laser, session.q_rad[rows], session.first_psd[rows], 5e-6, Form.PAIR_POINTS, parameters)
+    return PointConstraint(
+        arm, laser, session.q_rad[rows], session.first_psd[rows], 5e-6, Constraint.PAIR_POINTS, parameters
+    )
 
 
 def test_the_papers_failure_is_told_before_any_number(four_poses):

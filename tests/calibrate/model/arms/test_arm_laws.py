@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from acquisition.recording.rig import Arm, ArmModel, Joint, Pose, Rig, Tolerance
 from calibrate.model.arms.catalogue import ARMS, arm_of
-from calibrate.model.arms.link_tolerance import FREE, HELD_AS_DRAWN, LinkBelief
+from calibrate.model.arms.link_tolerance import FREE, HELD_NOMINAL, LinkTolerance
 
 STEP = 1e-6
 UR5E = [(0.1625, 0, np.pi / 2), (0, -0.425, 0), (0, -0.3922, 0), (0.1333, 0, np.pi / 2), (0.0997, 0, -np.pi / 2)]
@@ -119,7 +119,7 @@ def test_without_tolerance_the_links_are_held_and_zeros_stay_free():
 
 @pytest.mark.parametrize("model", list(ARMS))
 def test_a_free_belief_frees_the_links_without_opinion_and_held_frees_the_zeros_only(model):
-    free, held = arm_of(rig_of(model), FREE), arm_of(rig_of(model), HELD_AS_DRAWN)
+    free, held = arm_of(rig_of(model), FREE), arm_of(rig_of(model), HELD_NOMINAL)
     assert {p.name for p in held.parameters if p.free} == {f"joint{i}.zero" for i in range(1, 7)}
     assert all(p.prior == np.inf for p in free.parameters)
     assert sum(p.free for p in free.parameters) > 25
@@ -145,7 +145,7 @@ def test_local_poe_sees_four_numbers_an_axis_and_six_of_the_flange():
 
 @pytest.mark.parametrize("model", list(ARMS))
 def test_a_drawing_tolerance_is_the_prior_of_lengths_and_angles_but_not_of_zeros(model):
-    arm = arm_of(rig_of(model), LinkBelief(1e-4, 2e-4))
+    arm = arm_of(rig_of(model), LinkTolerance(1e-4, 2e-4))
     by_unit = {"m": 1e-4, "rad": 2e-4}
     for p in arm.parameters:
         if p.free:
@@ -154,4 +154,4 @@ def test_a_drawing_tolerance_is_the_prior_of_lengths_and_angles_but_not_of_zeros
 
 def test_a_negative_tolerance_is_refused():
     with pytest.raises(ValueError, match="a sigma is not negative"):
-        LinkBelief(-1e-4, 1e-4)
+        LinkTolerance(-1e-4, 1e-4)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from calibrate.errors import DataError
-from calibrate.model.optics.dual_psd import DualPsd, Fixture, PairBelief
+from calibrate.model.optics.dual_psd import DualPsd, Fixture, PairTolerance
 from calibrate.model.optics.laser import LaserMount
 
 
@@ -70,7 +70,7 @@ def test_derivative_by_twist(session):
 
 
 def test_derivative_by_every_parameter_gains_and_psd2_included(session):
-    sensor, T = sensor_of(session, gain_prior=5e-3, pair_prior=PairBelief(5e-5, 1e-3)), flanges(session)
+    sensor, T = sensor_of(session, gain_prior=5e-3, pair_prior=PairTolerance(5e-5, 1e-3)), flanges(session)
     phi = values(sensor, np.random.default_rng(2), 1e-3)
     analytic = sensor.by_parameter(phi, T)
     for k, step in enumerate(np.eye(len(phi)) * 1e-6):
@@ -83,7 +83,7 @@ def test_gains_and_psd2_are_held_unless_a_prior_frees_them(session):
     assert held == {f"psd{k}.gain_{a}" for k in (1, 2) for a in "xy"} | {
         f"psd2.{a}" for a in ("x", "y", "z", "roll", "pitch", "yaw")
     }
-    assert all(p.free for p in sensor_of(session, gain_prior=5e-3, pair_prior=PairBelief(5e-5, 1e-3)).parameters)
+    assert all(p.free for p in sensor_of(session, gain_prior=5e-3, pair_prior=PairTolerance(5e-5, 1e-3)).parameters)
 
 
 def test_a_placement_without_poses_is_held(sessions):

@@ -13,7 +13,7 @@ from calibrate.fit.identify.identify import identify
 from calibrate.fit.identify.rounds import settled_fit
 from calibrate.fit.identify.session import about_of, instruments_for_fit
 from calibrate.fit.instruments import instruments_of
-from calibrate.model.checks.gross_error import BlunderKind
+from calibrate.model.checks.gross_error import GrossErrorKind
 from calibrate.model.predict import Predictor, predict
 from calibrate.model.sensors.catalogue import witnesses_of
 from tests.calibrate.model.sensors.camera_sessions import (
@@ -131,7 +131,8 @@ def test_a_gross_error_is_named_and_left_out(rig, session):
 
 
 @pytest.mark.parametrize(
-    ("names", "factor", "kind"), [(PLACE, 1e3, BlunderKind.MILLIMETRES), (TURN, 180.0 / np.pi, BlunderKind.DEGREES)]
+    ("names", "factor", "kind"),
+    [(PLACE, 1e3, GrossErrorKind.MILLIMETRES), (TURN, 180.0 / np.pi, GrossErrorKind.DEGREES)],
 )
 def test_another_unit_explains_the_readings_better(rig, session, names, factor, kind):
     q = session.poses(60)

@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
-from calibrate.model.optics.dual_psd import DualPsd, Fixture, PairBelief
+from calibrate.model.optics.dual_psd import DualPsd, Fixture, PairTolerance
 from calibrate.model.optics.laser import LaserMount
 from calibrate.model.placement import Device, Target
 from calibrate.model.rigid import transform
@@ -49,7 +49,7 @@ def dual_psd():
     faces = Fixture(
         0.01, transform([0, 0.12, 0.12], [2.356, 0, 0]), {k: transform([k, 0, 0], [0, 0.1, 0]) for k in (1, 2)}
     )
-    return DualPsd(MOUNT, faces, GROUP, 1 + np.arange(POSES) % 2, 1e-3, PairBelief(1e-4, 1e-3))
+    return DualPsd(MOUNT, faces, GROUP, 1 + np.arange(POSES) % 2, 1e-3, PairTolerance(1e-4, 1e-3))
 
 
 def camera():

@@ -19,9 +19,9 @@ from calibrate.diagnose.gross_errors_first import Cleared
 from calibrate.diagnose.state.fitted import fit_geometry
 from calibrate.diagnose.state.session import session_of
 from calibrate.diagnose.with_model.from_diagnosis import model_of_fit
-from calibrate.model.effect_records import Effect, SessionRecord
+from calibrate.model.effect_records import EffectRecord, SessionRecord
 from calibrate.model.effects.catalogue import holds_of, terms_of
-from calibrate.model.effects.curve import Curve
+from calibrate.model.effects.curve import SmoothCurve
 from calibrate.model.effects.second_encoders import SECOND
 from calibrate.model.effects.term import Shape
 from calibrate.model.model_file import Covariance
@@ -70,14 +70,16 @@ def carrying(model, fit, samples, term):
     coefficients = direction * PLAIN / np.max(np.abs(basis @ direction))
     every = recorded_conditions(fit.drivers, fit.session.samples)
     needs = needed_columns(term.depends_on, every)
-    effect = Effect(
+    effect = EffectRecord(
         name=NAME,
         where=term.port.where,
         physics="unknown" if term.open else term.physics,
         depends_on=",".join(term.depends_on),
         shape=term.shape.value,
         order=term.order,
-        variant=SECOND if isinstance(term, Curve) and term.port.instrument == "encoder-difference" else term.variant,
+        variant=SECOND
+        if isinstance(term, SmoothCurve) and term.port.instrument == "encoder-difference"
+        else term.variant,
         parameters={},
         coefficients={f"{NAME}.c{j}": float(c) for j, c in enumerate(coefficients)},
         inner={spec.name: float(v) for spec, v in zip(term.inner, inner, strict=True)},
@@ -85,8 +87,8 @@ def carrying(model, fit, samples, term):
         holds=holds_of(term).value,
         range={},
         listed=term.physics if term.open else "",
-        component=term.component if isinstance(term, Curve) else None,
-        waves=term.waves if isinstance(term, Curve) else None,
+        component=term.component if isinstance(term, SmoothCurve) else None,
+        waves=term.waves if isinstance(term, SmoothCurve) else None,
     )
     conditions = {name: tuple(None if np.isnan(v) else float(v) for v in column) for name, column in every.items()}
     session = SessionRecord("", float(min(conditions["t_s"])), float(max(conditions["t_s"])), "0" * 64, conditions)

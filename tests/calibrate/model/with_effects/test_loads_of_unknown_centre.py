@@ -6,7 +6,7 @@ from msgspec import structs
 
 from acquisition.recording import Samples
 from calibrate.apply.predicting import predict_with_physics
-from calibrate.model.effect_records import Effect, EffectParameter
+from calibrate.model.effect_records import EffectParameter, EffectRecord
 from calibrate.model.effects.loads import UNSTATED_CENTRE_M
 from calibrate.model.with_effects.applied import conditions_of_effects
 from tests.calibrate.model.with_effects.two_joints import two_joints
@@ -39,7 +39,7 @@ CENTRE = ("payload_com_x_m", "payload_com_y_m", "payload_com_z_m")
 def soft(session=None, rig=RIG):
     """A model whose joint 2 yields to weight; `session`: further conditions that its four rows recorded."""
     model = two_joints()
-    effect = Effect(
+    effect = EffectRecord(
         name="joint2-compliance",
         where="joint2.angle",
         physics="joint-compliance",

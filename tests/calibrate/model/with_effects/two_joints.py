@@ -1,6 +1,6 @@
 """A stretched arm of two joints whose first one has play: a model of schema 2, small enough to check by hand."""
 
-from calibrate.model.effect_records import Effect, EffectParameter, SessionRecord
+from calibrate.model.effect_records import EffectParameter, EffectRecord, SessionRecord
 from calibrate.model.model_file import Covariance, ModelFile, RigIdentity
 
 RIG = """schema = 1
@@ -31,7 +31,7 @@ SIDES = [1.0, -1.0, 1.0, -1.0]
 
 
 def two_joints():
-    play = Effect(
+    play = EffectRecord(
         name="joint1-backlash",
         where="joint1.angle",
         physics="backlash",

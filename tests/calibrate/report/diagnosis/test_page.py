@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from calibrate.diagnose.record.schema import (
-    BlunderRecord,
     CurveRecord,
     DiagnosisFile,
     FindingRecord,
     FloorRecord,
     FreeSpaceRecord,
+    GrossErrorRecord,
     LackOfFitRecord,
     NameRecord,
     NoiseRecord,
@@ -82,7 +82,7 @@ FILE = DiagnosisFile(
     invisible=(NameRecord("psd1.reading", "incidence1", "smooth", None, "psd-cover-glass"),),
     confusable=((NameRecord(*COMPLIANCE), NameRecord("joint3.angle", "q3", "linear", None, "gear-ratio-error"), 0.98),),
     not_recorded=(NotRecorded("payload", "payload_kg", "payload-compliance"),),
-    blunders=(BlunderRecord("bad shot", (8,), "x_m", "row 8, x_m: far off; measure it again"),),
+    blunders=(GrossErrorRecord("bad shot", (8,), "x_m", "row 8, x_m: far off; measure it again"),),
 )
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from calibrate.model.assumed_rig import BelievedRig
+from calibrate.model.assumed_rig import AssumedRig
 from calibrate.report.evidence.session_evidence import SessionEvidence, SpotSession, spot_session
 from calibrate.report.figures.rig_scene import (
     FittedRig,
@@ -64,7 +64,7 @@ def test_bones_lead_from_the_base_through_every_axis_to_the_laser(drawn: Scene) 
 
 
 def test_without_a_fit_the_rig_is_drawn_as_in_its_file(known: SpotSession, rig: FittedRig) -> None:
-    place, plain = known.places[0], BelievedRig(known.rig)
+    place, plain = known.places[0], AssumedRig(known.rig)
     as_drawn = FittedRig(plain, rig.T_psd1_psd2, rig.half_size_m)
     np.testing.assert_allclose(as_drawn.faces(place)[0], plain.T_base_psd1(place))
     assert np.linalg.norm((as_drawn.faces(place) - rig.faces(place))[:, :3, 3], axis=1).max() > 1e-4
