@@ -1,8 +1,7 @@
 """A simulation brought to agree with a recording: compared, diagnosed, replayed with what was found, compared again.
 
-Rows are split by pose: the diagnosis sees three quarters, and how far the simulation is
-away, before and after, is measured on the others. The two comparisons take all rows. reconcile.json, version 1, is
-described in docs/formats.md.
+Rows are split by pose: the diagnosis sees three quarters, and how far the simulation is away, before and after, is
+measured on the others. The two comparisons take all rows. reconcile.json, version 1, is described in docs/formats.md.
 """
 
 from dataclasses import dataclass, replace
