@@ -77,4 +77,5 @@ def _write(out: Path, found: Reconciled, source: Recording) -> None:
         write_replayed(out / "simulated.mcap", found.brought.simulated, found.measured, about)
         write_json(out / "after.json", found.brought.after)
     write_json(out / "reconcile.json", found.file)
-    write_reconciliation_page(out / "page.html", found)
+    first_link = None if found.before is None else found.before.first_link
+    write_reconciliation_page(out / "page.html", found.file, found.measured.rig, first_link)

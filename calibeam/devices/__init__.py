@@ -2,5 +2,5 @@
 
 Open first `site.connected`: all devices of a session, each with its reader thread, and what stops the arm when one
 fails. `recorder` keeps the recording whole, `check` is `calibeam check`, `encoder_log` is `calibeam log`. A new
-instrument gets a function like `psd.psd_driver` and a line in `site`.
+instrument gets a function like `instruments.psd_driver` and a line in `site`.
 """

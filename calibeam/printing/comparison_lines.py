@@ -8,23 +8,24 @@ from rich.text import Text
 
 from calibeam.console import Console
 from calibeam.printing.results import print_diagnosis
-from calibeam.results.reconciliation import ReconcileFile
-from calibrate.compare import mismatches
-from calibrate.compare.comparison import (
+from calibrate.compare import comparison_file
+from calibrate.compare.comparison_file import (
     ComparisonFile,
     DifferenceRecord,
     DroppedRecord,
+    Level,
     ReadingRecord,
     StreamRecord,
+    in_words,
 )
 from calibrate.compare.link_differs import Parted
-from calibrate.compare.mismatches import Level, in_words
+from calibrate.compare.reconciled_rows import ReconcileFile
 from calibrate.compare.rig_and_streams import SAYS
 from calibrate.model.effects.term import Size, with_sigma
 from calibrate.quantities import length, significant
 
 FEW = 3  # alternatives of one
-CAUSES = frozenset(level.value for level in mismatches.CAUSES)
+CAUSES = frozenset(level.value for level in comparison_file.CAUSES)
 SHORT = (Level.JOINT_ZEROS.value, Level.LINKS.value)
 
 

@@ -20,8 +20,8 @@ from calibeam.prove.record import Truth, truth_of
 from calibeam.prove.scenario import Kind, Mix
 from calibeam.prove.scoring import added_noise_m
 from calibeam.prove.seal import Layout, open_seal
-from calibeam.results.reconciliation import AGREES, ReconcileFile
 from calibeam.software import SOFTWARE
+from calibrate.compare.reconciled_rows import AGREES, ReconcileFile
 from calibrate.diagnose.record.file import read_diagnosis
 from calibrate.diagnose.record.schema import DiagnosisFile
 from simulators.conceal.wanted import Family

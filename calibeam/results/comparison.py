@@ -3,8 +3,8 @@
 from acquisition.recording import Recording
 from calibeam.results.simulator import simulated_by_model
 from calibeam.software import SOFTWARE
-from calibrate.compare import comparison
-from calibrate.compare.comparison import ComparisonFile
+from calibrate.compare import compare_recordings
+from calibrate.compare.comparison_file import ComparisonFile
 from calibrate.model.model_file import ModelFile
 
 
@@ -23,6 +23,6 @@ def compare(
     """
     made_of = simulation if isinstance(simulation, ModelFile) else None
     simulated = simulated_by_model(simulation, measured) if isinstance(simulation, ModelFile) else simulation
-    return comparison.compare(
+    return compare_recordings.compare(
         measured, simulated, SOFTWARE, diagnosed=diagnosed, made_of=made_of, structure=structure or made_of
     )

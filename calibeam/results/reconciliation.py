@@ -1,32 +1,45 @@
 """A simulation brought to agree with a recording: compared, diagnosed, replayed with what was found, compared again.
 
-Rows are split by pose, so that repeats stay together: the diagnosis sees three quarters, and how far the simulation is
-away, before and after, is measured on the others. The two comparisons take all rows. reconcile.json, version 1, is
-described in docs/formats.md.
+Rows are split by pose: the diagnosis sees three quarters, and how far the simulation is away, before and after, is
+measured on the others. The two comparisons take all rows. reconcile.json, version 1, is described in docs/formats.md.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import msgspec
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
 
 from acquisition.recording import Recording, Samples, readings_sha256
-from acquisition.recording.rig import Rig, parse_rig
-from acquisition.recording.samples import ORIENTATION, POSITION, SPOTS, WIRE
-from calibeam.results.comparison import ComparisonFile, compare
+from acquisition.recording.rig import parse_rig
 from calibeam.results.diagnosis import diagnose_recording
 from calibeam.results.identification import Planned, identify_session, session_model
 from calibeam.simulation.replayed_recording import Replayed, replay
 from calibeam.software import SOFTWARE
 from calibrate.compare.beside_simulation import device_between
+from calibrate.compare.compare_recordings import compare
+from calibrate.compare.comparison_file import ComparisonFile
 from calibrate.compare.corrected import corrected_samples, simulated_of
 from calibrate.compare.matched import match
-from calibrate.compare.seated import is_seated
-from calibrate.diagnose.doubts import Verdict
+from calibrate.compare.reconciled_rows import (
+    AGREES,
+    QUANTITIES,
+    UNSEEN,
+    AllRowsRecord,
+    ReconcileFile,
+    enough,
+    on_all_rows,
+    on_unseen_rows,
+    poses_of,
+    refuse_unread,
+    set_alike_by,
+    split,
+    stated_m_of,
+    verdict_text,
+    what_remains,
+    what_was_left_out,
+)
 from calibrate.diagnose.from_recording import FEWEST, Diagnosed
 from calibrate.diagnose.record.schema import DiagnosisFile
 from calibrate.diagnose.state import session_of
@@ -35,102 +48,11 @@ from calibrate.errors import DataError
 from calibrate.fit.fit_plan import FitPlan
 from calibrate.model.model_file import ModelFile
 from calibrate.model.placement import TARGETS
-from calibrate.model.sensors import (
-    full_pose,
-    position,
-    spots,
-    wire,
-)
-from calibrate.quantities import counted, length, significant
+from calibrate.quantities import counted, length
 
-Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
-
-BEYOND = 3.0  # times the stated noise of the instrument: more is not noise unless repeated poses scatter as much
-REPEATED = "scatter within repeats"  # how the source of such a noise begins
-FRAME = 6  # of a measuring device
 FRAME_ROWS = 3  # of a tracker, for its frame
-AGREES = 1.3  # rms over noise on unseen rows, up to which nothing is left
-UNSEEN = 0.25  # share of the poses
-FEWEST_UNSEEN = 5
-FEW_ROWS = 0.05  # share of the unseen rows up to which they are listed
-SAME_POSE_RAD = 2e-3  # a servo comes back closer, and other poses are farther away
 BUILT = ("joint", "link", "psd")  # parameters of what a rig file states as built; where things stand is fitted
-# instrument -> lengths that it reads
-QUANTITIES = {
-    spots.KIND.name: SPOTS,
-    position.KIND.name: POSITION,
-    full_pose.KIND.name: POSITION,
-    wire.KIND.name: (WIRE,),
-}
-
-
-class RowRecord(msgspec.Struct, frozen=True):
-    """Of one unseen row: rms of its coordinates, measured less simulated; `after_m`: with geometry and physics."""
-
-    instrument: str
-    t_s: float
-    before_m: float
-    geometry_m: float
-    after_m: float
-
-
-class UnseenRecord(msgspec.Struct, frozen=True):
-    """Measured less simulated of one instrument on the unseen rows, rms of a coordinate."""
-
-    instrument: str
-    rows: int
-    before_m: float
-    geometry_m: float
-    after_m: float
-    noise_m: float
-    noise_from: str
-    before: float  # over noise
-    geometry: float
-    after: float
-    stated_m: float | None = None  # noise of the instrument by the rig file
-
-
-class AllRowsRecord(msgspec.Struct, frozen=True):
-    """Of too few rows to diagnose: measured less simulated on all, rms of a coordinate; `low_m` to `high_m`: 95 %."""
-
-    instrument: str
-    rows: int
-    rms_m: float
-    low_m: float
-    high_m: float
-    stated_m: float | None
-
-
-class LeftOut(msgspec.Struct, frozen=True):
-    """What the simulation lacks, as `before` or the diagnosis reports it."""
-
-    where: str
-    physics: str
-    says: str
-    alternatives: tuple[str, ...]
-
-
-class ReconcileFile(msgspec.Struct, frozen=True):
-    """Everything; what was found in full stands in the files beside it."""
-
-    schema: int
-    kind: str
-    software: str
-    measured: str
-    simulation: str
-    verdict: str  # agree, differ or undecided
-    says: str
-    seed: int
-    seen: int
-    unseen_rows: tuple[int, ...]  # from 0, in the measured samples that the simulation has, too
-    unseen: tuple[UnseenRecord, ...]
-    rows: tuple[RowRecord, ...]
-    left_out: tuple[LeftOut, ...]
-    remains: tuple[str, ...]
-    next: tuple[str, ...]
-    notes: tuple[str, ...]
-    all_rows: tuple[AllRowsRecord, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,14 +80,14 @@ def reconcile(measured: Recording, simulation: Recording | str, name: str, *, se
 
     Too few rows to diagnose and to keep some unseen are a result, too. DataError where the two cannot be compared.
     """
-    _refuse_unread(measured.samples)
+    refuse_unread(measured.samples)
     if len(measured.samples) < FRAME_ROWS:
         return _of_few(measured, (), name, seed, None)
     measured, simulated, seen, unseen = _sides(measured, simulation, name, seed)
-    before = compare(measured, simulated)
-    if not _enough(seen, unseen):
-        alike = _set_alike(measured, simulated, np.arange(len(measured.samples)))
-        found = tuple(_on_all_rows(measured.samples, alike, _stated_m(measured.rig)))
+    before = compare(measured, simulated, SOFTWARE)
+    if not enough(seen, unseen):
+        alike = set_alike_by(measured, simulated, np.arange(len(measured.samples)))
+        found = tuple(on_all_rows(measured.samples, alike, stated_m_of(measured.rig)))
         return _of_few(measured, found, name, seed, before)
     part = replace(measured, samples=measured.samples.take(seen), streams={}, events=())
     found, diagnosis = diagnose_recording(part)
@@ -175,15 +97,15 @@ def reconcile(measured: Recording, simulation: Recording | str, name: str, *, se
     plain = replay(measured, geometry, noisy=False).exact
     if isinstance(simulation, Recording):
         plain = _geometry_alone(measured, simulated, seen)
-    after = compare(measured, _as_recording(measured, replayed.samples, "simulated.mcap"))
-    told, rows = _unseen(
+    after = compare(measured, _as_recording(measured, replayed.samples, "simulated.mcap"), SOFTWARE)
+    told, rows = on_unseen_rows(
         measured.samples,
-        (_set_alike(measured, simulated, seen), plain, replayed.exact),
+        (set_alike_by(measured, simulated, seen), plain, replayed.exact),
         unseen,
         diagnosis,
-        _stated_m(measured.rig),
+        stated_m_of(measured.rig),
     )
-    remains = tuple(_remains(told, rows, diagnosis, after))
+    remains = tuple(what_remains(told, rows, diagnosis, after))
     agrees = not remains
     file = ReconcileFile(
         1,
@@ -192,13 +114,13 @@ def reconcile(measured: Recording, simulation: Recording | str, name: str, *, se
         measured.path.name,
         name,
         "agree" if agrees else "differ",
-        _says(told, before, remains),
+        verdict_text(told, before, remains),
         seed,
         len(seen),
         tuple(unseen.tolist()),
         told,
         rows,
-        tuple(_left_out(before, diagnosis, isinstance(simulation, Recording))),
+        tuple(what_was_left_out(before, diagnosis, isinstance(simulation, Recording))),
         remains,
         diagnosis.next,
         tuple(dict.fromkeys((*before.notes, *replayed.notes, *after.notes))),
@@ -211,7 +133,7 @@ def _of_few(
 ) -> Reconciled:
     """What all rows show without a diagnosis: how far apart the two are, and whether noise alone may do it."""
     beyond = [one for one in found if one.stated_m is not None and one.low_m > AGREES * one.stated_m]
-    poses, needed = int(_poses(measured.samples).max()) + 1, round(FEWEST / (1.0 - UNSEEN))
+    poses, needed = int(poses_of(measured.samples).max()) + 1, round(FEWEST / (1.0 - UNSEEN))
     rows = f"{counted(len(measured.samples), 'row')} in {counted(poses, 'pose')}"
     open_ = f"{rows}: what the simulation lacks cannot be decided; about {needed} poses are needed"
     far = "; ".join(
@@ -227,50 +149,6 @@ def _of_few(
     return Reconciled(file, before, measured, None)
 
 
-def _on_all_rows(
-    measured: Samples, simulated: Samples, stated_m: Mapping[str, float | None]
-) -> Iterator[AllRowsRecord]:
-    """The frame of the device that was fitted takes degrees of freedom; so few rows leave wide limits."""
-    for name, columns in QUANTITIES.items():
-        if not all(c in measured and c in simulated for c in columns):
-            continue
-        misfit = (_stacked(measured, columns) - _stacked(simulated, columns))[_rows_of(name, measured)]
-        misfit = misfit[np.isfinite(misfit).all(axis=1)]
-        dof = misfit.size - FRAME
-        if dof < 1:
-            continue
-        rms_m = float(np.sqrt(np.sum(misfit**2) / dof))
-        low_m, high_m = (float(rms_m * np.sqrt(dof / chi2.ppf(q, dof))) for q in (0.975, 0.025))
-        yield AllRowsRecord(name, len(misfit), rms_m, low_m, high_m, stated_m.get(name))
-
-
-def _stated_m(rig: Rig) -> dict[str, float | None]:
-    """Noise of a coordinate by instrument, as the rig file states it."""
-    noise = rig.noise
-    in_space = dict.fromkeys((position.KIND.name, full_pose.KIND.name), noise.position_m)
-    return {spots.KIND.name: noise.psd_m, **in_space, wire.KIND.name: noise.wire_m}
-
-
-def _rows_of(name: str, samples: Samples) -> NDArray[np.bool_]:
-    """(row,) those that an instrument has read: a position with a turn is one of a 6-D target."""
-    every = np.ones(len(samples), dtype=np.bool_)
-    if name not in (position.KIND.name, full_pose.KIND.name):
-        return every
-    with_turn = all(column in samples for column in ORIENTATION)
-    turned = np.isfinite(_stacked(samples, ORIENTATION)).all(axis=1) if with_turn else ~every
-    return np.asarray(turned == (name == full_pose.KIND.name), dtype=np.bool_)
-
-
-def _refuse_unread(samples: Samples) -> None:
-    if np.any(is_seated(samples)):
-        raise DataError(
-            "rows with a probe in a cone or at a bar: the joint angles are the reading; how far a simulation is off "
-            "on unseen rows cannot be determined; use compare and diagnose"
-        )
-    if not any(name in samples for names in QUANTITIES.values() for name in names):
-        raise DataError("the samples hold no spots, positions or wire lengths to bring a simulation to agree with")
-
-
 def _sides(
     measured: Recording, simulation: Recording | str, name: str, seed: int
 ) -> tuple[Recording, Recording, Ints, Ints]:
@@ -283,7 +161,7 @@ def _sides(
     seen, unseen = split(measured.samples, seed)
     here = replace(measured, events=())
     drawn = replace(here, rig=parse_rig(simulation, name), rig_text=simulation)
-    part = replace(drawn, samples=here.samples.take(seen) if _enough(seen, unseen) else here.samples)
+    part = replace(drawn, samples=here.samples.take(seen) if enough(seen, unseen) else here.samples)
     told = Planned(FitPlan(schema=1, hold=_stated(part), share=0.0, splits=()))
     model = session_model(identify_session(part, told), part, told)
     exact = replay(drawn, model, noisy=False).exact
@@ -298,25 +176,6 @@ def _stated(drawn: Recording) -> tuple[str, ...]:
     stated = (*BUILT, *(f"{TARGETS}{k}." for k in drawn.rig.targets))
     stated = (*stated, "tool.") if drawn.rig.tool.point_m is not None else stated
     return tuple(p.name for p in session_of(drawn.rig, drawn.samples).parameters if p.name.startswith(stated))
-
-
-def split(samples: Samples, seed: int) -> tuple[Ints, Ints]:
-    """Rows seen and unseen, a pose and its repeats on one side."""
-    pose = _poses(samples)
-    drawn = np.random.default_rng(seed).permutation(int(pose.max(initial=-1)) + 1)
-    away = drawn[: round(UNSEEN * len(drawn))]
-    unseen = np.flatnonzero(np.isin(pose, away))
-    return np.flatnonzero(~np.isin(pose, away)), unseen
-
-
-def _enough(seen: Ints, unseen: Ints) -> bool:
-    return len(seen) >= FEWEST and len(unseen) >= FEWEST_UNSEEN
-
-
-def _poses(samples: Samples) -> Ints:
-    """(row,) number of the pose, from 0."""
-    steps = np.round(samples.joints() / SAME_POSE_RAD)
-    return np.unique(steps, axis=0, return_inverse=True)[1].reshape(-1)
 
 
 def _geometry(found: Diagnosed, part: Recording) -> ModelFile:
@@ -347,113 +206,3 @@ def _timed(model: ModelFile, samples: Samples) -> ModelFile:
 
 def _as_recording(source: Recording, samples: Samples, name: str) -> Recording:
     return replace(source, path=Path(name), samples=samples, streams={}, events=())
-
-
-def _set_alike(measured: Recording, simulated: Recording, seen: Ints) -> Samples:
-    """The simulated readings as the measuring device has them where it stood, by the seen rows."""
-    samples = simulated.samples
-    if not all(name in samples for name in POSITION):
-        return samples
-    pair = measured.samples.take(seen), samples.take(seen)
-    T = device_between(simulated_of(simulated.rig, pair[1]), pair)
-    there_m = np.stack([samples.column(name) for name in POSITION], axis=1)
-    here_m = (there_m - T[:3, 3]) @ T[:3, :3]
-    return Samples({**samples.columns, **dict(zip(POSITION, here_m.T, strict=True))}, samples.n_joints)
-
-
-def _unseen(
-    measured: Samples,
-    states: tuple[Samples, Samples, Samples],
-    unseen: Ints,
-    diagnosis: DiagnosisFile,
-    stated_m: Mapping[str, float | None],
-) -> tuple[tuple[UnseenRecord, ...], tuple[RowRecord, ...]]:
-    """DataError where no instrument has a noise and unseen readings."""
-    floors = {floor.instrument: floor for floor in diagnosis.floors}
-    told: list[UnseenRecord] = []
-    rows: list[RowRecord] = []
-    for name, columns in QUANTITIES.items():
-        floor = floors.get(name)
-        if not all(c in measured and all(c in state for state in states) for c in columns):
-            continue
-        if floor is None or not floor.rms_m:
-            continue
-        read = _stacked(measured, columns)[unseen]
-        misfits = [read - _stacked(state, columns)[unseen] for state in states]
-        known = np.all([np.isfinite(m).all(axis=1) for m in misfits], axis=0) & _rows_of(name, measured)[unseen]
-        if not known.any():
-            continue
-        was, plain, now = (float(np.sqrt(np.mean(m[known] ** 2))) for m in misfits)
-        noise_m = float(floor.rms_m)
-        over = was / noise_m, plain / noise_m, now / noise_m
-        told.append(
-            UnseenRecord(name, int(known.sum()), was, plain, now, noise_m, floor.source, *over, stated_m.get(name))
-        )
-        each = [np.sqrt(np.mean(m[known] ** 2, axis=1)).tolist() for m in misfits]
-        t_s = measured.column("t_s")[unseen][known].tolist()
-        rows += [RowRecord(name, *row) for row in zip(t_s, *each, strict=True)]
-    if not told:
-        raise DataError("no unseen reading with a known noise: how far the simulation is off cannot be determined")
-    return tuple(told), tuple(rows)
-
-
-def _stacked(samples: Samples, names: tuple[str, ...]) -> Floats:
-    return np.stack([samples.column(name) for name in names], axis=1)
-
-
-def _remains(
-    told: tuple[UnseenRecord, ...], rows: tuple[RowRecord, ...], diagnosis: DiagnosisFile, after: ComparisonFile
-) -> Iterator[str]:
-    """Why the two do not agree yet; nothing where they do."""
-    for one in told:
-        if not one.after <= AGREES:
-            where = _few_rows(one, [row for row in rows if row.instrument == one.instrument])
-            yield f"{one.instrument}: {one.after:.2f} times the noise on unseen rows, more than {AGREES}{where}"
-        elif one.stated_m and one.after_m > BEYOND * one.stated_m and not one.noise_from.startswith(REPEATED):
-            yield (
-                f"{one.instrument}: {length(one.after_m)} on unseen rows, {significant(one.after_m / one.stated_m)} "
-                f"times the stated noise of {length(one.stated_m)}, and no repeated pose shows that it is noise"
-            )
-    for left in (diagnosis.unexplained, *diagnosis.also_unexplained):
-        if left is not None:
-            yield left.says
-    if after.verdict != Verdict.CONSISTENT.value:
-        yield from [one.says for one in after.differences if one.decides] or [after.says]
-
-
-def _few_rows(one: UnseenRecord, rows: Sequence[RowRecord]) -> str:
-    """Which rows carry it, where the others agree: most often those at the very edge of a step or of a play."""
-    worst = sorted(rows, key=lambda row: row.after_m, reverse=True)
-    for count in range(1, round(FEW_ROWS * len(rows)) + 1):
-        others = np.sqrt(np.mean([row.after_m**2 for row in worst[count:]])) / one.noise_m
-        if others <= AGREES:
-            listed = ", ".join(f"{row.t_s:.2f} s" for row in sorted(worst[:count], key=lambda row: row.t_s))
-            return f"; {others:.2f} without {count} of {len(rows)} rows, at {listed}"
-    return ""
-
-
-def _left_out(before: ComparisonFile, diagnosis: DiagnosisFile, has_physics: bool) -> Iterator[LeftOut]:
-    """Physics as the diagnosis of the seen rows names it, then what the comparison names beside it.
-
-    `has_physics`: the simulation may hold some of its own, so that only the comparison shows what it lacks.
-    """
-    named: set[tuple[str, str]] = set()
-    for finding in () if has_physics and before.diagnosis is not None else diagnosis.findings:
-        named.add((finding.where, finding.physics))
-        others = tuple(f"{r.physics} at {r.where}" for r in finding.rivals)
-        yield LeftOut(finding.where, finding.physics, finding.says, others)
-    for one in before.differences:
-        if one.decides and (one.where, one.physics) not in named:
-            others = tuple(f"{a.physics} at {a.where}" for a in one.alternatives)
-            yield LeftOut(one.where, one.physics, one.says, others)
-
-
-def _says(told: tuple[UnseenRecord, ...], before: ComparisonFile, remains: tuple[str, ...]) -> str:
-    worst = max(told, key=lambda one: one.after)
-    far = f"on unseen rows {significant(worst.before)} times the noise before, {significant(worst.after)} after"
-    if remains:
-        count = "one thing remains" if len(remains) == 1 else f"{len(remains)} things remain"
-        return f"Simulation and recording do not agree yet: {far}; {count}."
-    if before.verdict == Verdict.CONSISTENT.value:
-        return f"Simulation and recording agree as they are: {far}."
-    return f"With what was found the simulation agrees with the recording: {far}."

@@ -6,8 +6,9 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
-from calibeam.results.reconciliation import AGREES, BEYOND, Reconciled, ReconcileFile, RowRecord, UnseenRecord
+from acquisition.recording.rig import Rig
 from calibeam.software import SOFTWARE
+from calibrate.compare.reconciled_rows import AGREES, BEYOND, ReconcileFile, RowRecord, UnseenRecord
 from calibrate.quantities import length, significant
 from calibrate.report.diagnosis import chain_figure, chain_of
 from calibrate.report.elements.html import (
@@ -30,30 +31,31 @@ SMALLEST_M = 1e-12  # of a row that a logarithmic axis can show
 CHAINS = 3  # pictures of the chain: the first differences
 
 
-def write_reconciliation_page(path: Path, found: Reconciled) -> Path:
+def write_reconciliation_page(path: Path, file: ReconcileFile, rig: Rig, first_link: str | None) -> Path:
     """One HTML file at `path`; returns it. DataError where it cannot be written."""
-    return write_page(path, reconciliation_html(found))
+    return write_page(path, reconciliation_html(file, rig, first_link))
 
 
-def reconciliation_html(found: Reconciled) -> str:
-    """The page as text."""
-    file = found.file
+def reconciliation_html(file: ReconcileFile, rig: Rig, first_link: str | None) -> str:
+    """The page as text; `first_link`: where the two differ first."""
     masthead = tag(
         "header",
         tag("p", "A simulation and a recording", cls="kicker"),
-        tag("h1", found.measured.rig.name),
+        tag("h1", rig.name),
         tag("p", f"{file.measured} · {file.simulation} · {SOFTWARE}", cls="byline"),
     )
     verdict = tag("div", tag("strong", file.says), cls=f"verdict {'good' if file.verdict == 'agree' else 'care'}")
-    contents, chapters = CONTENTS, (verdict, _before(found), _left_out(found), _after(file), _remains(file))
-    if found.brought is None:
+    contents, chapters = (
+        CONTENTS,
+        (verdict, _before(file, first_link), _left_out(file, len(rig.arm.joints)), _after(file), _remains(file)),
+    )
+    if not file.seen:
         contents, chapters = {"remains": CONTENTS["remains"]}, (verdict, _remains(file))
     return page(f"Reconciliation of {file.measured}", masthead, contents, chapters, SOFTWARE, kind="reconciliation")
 
 
-def _before(found: Reconciled) -> Html:
-    file, first = found.file, found.before.first_link if found.before else None
-    where = f" They differ first at the {first}." if first else ""
+def _before(file: ReconcileFile, first_link: str | None) -> Html:
+    where = f" They differ first at the {first_link}." if first_link else ""
     lead = (
         f"Measured less simulated on {len(file.unseen_rows)} rows that nothing was fitted to; where the measuring "
         f"device stands is taken into account.{where}"
@@ -65,15 +67,14 @@ def _before(found: Reconciled) -> Html:
     return section("before", CONTENTS["before"], lead, tag("div", *tiles, cls="tiles"), *_pictures(file, "before"))
 
 
-def _left_out(found: Reconciled) -> Html:
-    file = found.file
+def _left_out(file: ReconcileFile, joints: int) -> Html:
     lead = "Each difference with its size and one sigma, and what else would explain it."
     if not file.left_out:
         return section("left-out", CONTENTS["left-out"], lead, tag("p", "Nothing that these samples show."))
     rows = [(one.where or "-", one.physics, one.says, ", ".join(one.alternatives) or "none") for one in file.left_out]
     listed = table(("Where", "what", "how much", "alternatives"), rows)
     instruments = tuple(one.instrument for one in file.unseen)
-    chain = chain_of(len(found.measured.rig.arm.joints), instruments)
+    chain = chain_of(joints, instruments)
     places = list(dict.fromkeys(one.where for one in file.left_out if one.where))[:CHAINS]
     shown = [figure(chain_figure(f"place{i}", where, chain), where) for i, where in enumerate(places)]
     return section("left-out", CONTENTS["left-out"], lead, listed, *((panels(*shown),) if shown else ()))

@@ -25,6 +25,7 @@ from acquisition.recording.rig import Rig
 from acquisition.recording.samples import SPOTS, per_joint
 from acquisition.session.plan import Block, PoseKey
 from acquisition.session.records import Sample
+from calibeam.sessions.status import Forecast
 from calibrate.design import Candidates, Information, target_of, with_prior
 from calibrate.fit.accuracy import FELT_M
 from calibrate.fit.identify.rounds import SettledFit, coarse_start, settled_fit
@@ -96,32 +97,6 @@ def _poses(found: list[tuple[Floats, Floats]], keys: Sequence[PoseKey], n_joints
 
 
 LARGEST_M = 1e-2  # a prediction beyond this is no number that a straight-line covariance can give
-
-
-@dataclass(frozen=True)
-class Forecast:
-    """Lengths are rms, one sigma of the identified geometry, as in `calibeam design`."""
-
-    samples: int
-    goal_m: float
-    now_m: float | None = None  # None: not determined, see `why`
-    more: int | None = None  # poses of the plan until the goal, 0: reached; None: not by this plan
-    end_m: float | None = None  # when all of the plan is taken
-    why: str = ""  # no number yet
-    corrections: dict[str, float] | None = None  # fitted values by parameter name
-
-    @property
-    def says(self) -> str:
-        """One sentence for a person."""
-        if self.now_m is None:
-            return f"not determined yet: {self.why}"
-        now, goal = _microns(self.now_m), _microns(self.goal_m)
-        if self.more == 0:
-            return f"{now}: under {goal}"
-        if self.more is not None:
-            return f"{now}; {self.more} more poses bring it under {goal}"
-        end = "" if self.end_m is None else f"; the whole plan brings it to {_microns(self.end_m)}, not under {goal}"
-        return f"{now}{end}"
 
 
 def forecast(rig: Rig, taken: list[Sample], ahead: Candidates, goal_m: float) -> Forecast:
@@ -217,10 +192,6 @@ def _table(taken: list[Sample], ahead: Candidates) -> Samples:
 def _short(combinations: list[str], count: int) -> str:
     first = combinations[0] if combinations else "too few poses"
     return first if count <= 1 else f"{first}, and {count - 1} more"
-
-
-def _microns(length_m: float) -> str:
-    return f"{1e6 * length_m:.3g} µm" if length_m < 1e-3 else f"{1e3 * length_m:.2g} mm"
 
 
 END_S = 5.0  # longer than any forecast takes: a tenth of a second at ninety poses

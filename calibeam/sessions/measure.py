@@ -22,11 +22,12 @@ from calibeam.devices.site import connected
 from calibeam.learner import FittedLearner
 from calibeam.live.feed import Feed
 from calibeam.outcome import INTERRUPTS, PartialResult
-from calibeam.sessions.forecast import Ahead, Asked, Forecast, Forecaster, forecast
+from calibeam.sessions.forecast import Ahead, Asked, Forecaster, forecast
 from calibeam.sessions.job import STANDS_IN, Job, Part, notes_of
 from calibeam.sessions.keys import Keys
 from calibeam.sessions.person import Person
 from calibeam.sessions.reporter import ReportingJournal, StatusReporter
+from calibeam.sessions.status import Forecast
 from drivers.clock import Clock
 
 FORECAST_EVERY = 5  # poses; one takes a tenth of a second, in a thread of its own

@@ -13,8 +13,7 @@ from acquisition.recording.rig import Rig
 from acquisition.session.control import RunState
 from acquisition.session.records import Journal, Phase, Progress, Sample
 from calibeam.outcome import PartialResult
-from calibeam.sessions.forecast import Forecast
-from calibeam.sessions.status import UNDELIVERED, Listener, Pace, QualityKeeper, SessionStatus
+from calibeam.sessions.status import UNDELIVERED, Forecast, Listener, Pace, QualityKeeper, SessionStatus
 from calibrate.model.arms.rig_arm import limits_of
 from drivers.clock import Clock
 from drivers.errors import DeviceError

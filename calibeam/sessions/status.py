@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from acquisition.guided.reading import Coverage
 from acquisition.session.control import RunState
 from acquisition.session.records import Progress, Sample
-from calibeam.sessions.forecast import Forecast
 from drivers.clock import Clock
 
 ENOUGH = 3  # poses: before, the first search for the light would be taken for the usual
@@ -57,6 +56,36 @@ def clock_words(seconds: float) -> str:
 
 
 Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Forecast:
+    """Lengths are rms, one sigma of the identified geometry, as in `calibeam design`."""
+
+    samples: int
+    goal_m: float
+    now_m: float | None = None  # None: not determined, see `why`
+    more: int | None = None  # poses of the plan until the goal, 0: reached; None: not by this plan
+    end_m: float | None = None  # when all of the plan is taken
+    why: str = ""  # no number yet
+    corrections: dict[str, float] | None = None  # fitted values by parameter name
+
+    @property
+    def says(self) -> str:
+        """One sentence for a person."""
+        if self.now_m is None:
+            return f"not determined yet: {self.why}"
+        now, goal = _microns(self.now_m), _microns(self.goal_m)
+        if self.more == 0:
+            return f"{now}: under {goal}"
+        if self.more is not None:
+            return f"{now}; {self.more} more poses bring it under {goal}"
+        end = "" if self.end_m is None else f"; the whole plan brings it to {_microns(self.end_m)}, not under {goal}"
+        return f"{now}{end}"
+
+
+def _microns(length_m: float) -> str:
+    return f"{1e6 * length_m:.3g} µm" if length_m < 1e-3 else f"{1e3 * length_m:.2g} mm"
 
 
 @dataclass(frozen=True, eq=False)

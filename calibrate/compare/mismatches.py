@@ -6,20 +6,21 @@ second encoders, are set up again for every recording: they are stated with thei
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from enum import Enum
 
 import numpy as np
 from numpy.typing import NDArray
 
 from calibrate.compare.beside_simulation import Beside, Constant
+from calibrate.compare.comparison_file import TARGET, Level, Mismatch, Side, in_words
 from calibrate.compare.constants import LINK, ZERO
 from calibrate.compare.corrected import Simulated
-from calibrate.diagnose.doubts import Finding, Named, named
+from calibrate.diagnose.doubts import Finding, named
 from calibrate.diagnose.search import Bench, sizes_of
 from calibrate.diagnose.state import Fitted
-from calibrate.model.effects.moved import RECORDING
-from calibrate.model.effects.term import Accepted, Size, with_sigma
+from calibrate.model.effects.moved import (
+    RECORDING,
+)
+from calibrate.model.effects.term import Accepted, Size
 
 Floats = NDArray[np.float64]
 
@@ -28,52 +29,6 @@ LACKING = 0.25  # of an effect's size in the difference: less of it on one side 
 RANK = 1e-10  # of the largest singular value
 
 
-class Level(Enum):
-    """Causes, then constants, in this order; words of docs/formats.md."""
-
-    EFFECTS = "effects"
-    UNEXPLAINED = "unexplained"
-    STREAMS = "streams"
-    JOINTS = "joints"
-    RIG = "rig"
-    JOINT_ZEROS = "joint-zeros"
-    LINKS = "links"
-    ENCODER_ZEROS = "encoder-zeros"
-    FRAMES = "frames"
-
-
-class Side(Enum):
-    """Who has an effect or a property."""
-
-    NEITHER = ""  # a number of both that differs
-    MEASURED = "measured"
-    SIMULATED = "simulated"
-    BOTH = "both"
-
-
-@dataclass(frozen=True)
-class Mismatch:
-    """One difference, measured less simulated. `decides`: False where it is set up again for every recording."""
-
-    level: Level
-    where: str
-    physics: str
-    sizes: Mapping[str, Size]
-    says: str
-    decides: bool = True
-    side: Side = Side.NEITHER
-    p: float | None = None
-    alternatives: tuple[Named, ...] = ()
-    names: tuple[str, ...] = ()  # parameters of model.json that differ by these sizes, in their order
-
-    @property
-    def order(self) -> tuple[int, bool]:
-        """Place in the list: the target on the flange is the last of the frames."""
-        return list(Level).index(self.level), self.physics == TARGET
-
-
-CAUSES = (Level.EFFECTS, Level.UNEXPLAINED, Level.STREAMS, Level.JOINTS)
-TARGET = "tool-moved"
 LEVELS = {ZERO: Level.JOINT_ZEROS, LINK: Level.LINKS}  # all other constants are frames
 PARTS = {
     TARGET: "The target on the flange",
@@ -120,14 +75,6 @@ def _of_constant(one: Constant, zeros_rad: Floats) -> Mismatch:
         says = f"Link {owner.removeprefix('link')} differs: {what} by"
     sizes, says = {key: size}, f"{says} {in_words(key, size)}"
     return Mismatch(level, one.where, one.physics, sizes, says, p=one.p, alternatives=one.rivals, names=one.names)
-
-
-def in_words(name: str, size: Size) -> str:
-    """In the unit of the name: 2.0153 ± 0.0078 mrad."""
-    unit = "rad" if name.endswith("_rad") else "m"
-    steps = ((1.0, ""), (1e-3, "m"), (1e-6, "µ"))
-    scale, prefix = next((one for one in steps if abs(size.value) >= one[0]), steps[-1])
-    return f"{with_sigma(size.value / scale, size.sigma / scale)} {prefix}{unit}"
 
 
 def _frame(one: Constant, *, decides: bool = True) -> Mismatch:

@@ -13,13 +13,13 @@ from calibrate.compare.beside_simulation import (
 from calibrate.compare.chain import (
     Difference,
 )
-from calibrate.compare.link_differs import (
-    Parted,
-)
-from calibrate.compare.mismatches import (
+from calibrate.compare.comparison_file import (
     Level,
     Mismatch,
     Side,
+)
+from calibrate.compare.link_differs import (
+    Parted,
 )
 from calibrate.compare.rig_keys import RigKey
 from calibrate.compare.streams import (

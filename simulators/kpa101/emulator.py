@@ -118,7 +118,7 @@ DEFAULTS = {
 }
 
 
-class LitFaces(Protocol):
+class PhotocurrentSource(Protocol):
     """What a unit needs of a world."""
 
     @property
@@ -137,7 +137,7 @@ class Kpa101Unit:
     triggers, the 15 kHz of the head, the converter's own noise.
     """
 
-    def __init__(self, world: LitFaces, place: int, serial_number: int, transimpedance_v_a: float) -> None:
+    def __init__(self, world: PhotocurrentSource, place: int, serial_number: int, transimpedance_v_a: float) -> None:
         self.name = f"psd{place + 1}"
         self.x_sign, self.sum_volts = -1, 10.0
         self.silent = False  # fault: obeys and sends nothing
@@ -261,7 +261,7 @@ DEFAULT_SERIAL_NUMBERS = ("69250001", "69250002")  # 69 is the family's prefix
 TRANSIMPEDANCE_V_A = 1e5  # Thorlabs PDP90A: 100 kV/A
 
 
-def build(world: LitFaces, rig: Mapping[str, Any]) -> Bench:
+def build(world: PhotocurrentSource, rig: Mapping[str, Any]) -> Bench:
     """The pair of `rig["devices"]["psd"]`; links are the rig's `ports`, if any.
 
     Verbs: "psd.silence" {unit, on}; "psd.wiring" {unit, x_sign, sum_full_scale_v} rewires a unit.

@@ -12,7 +12,8 @@ from acquisition.recording import read
 from acquisition.recording.rig import rig_text
 from calibeam.cli import run
 from calibeam.results.comparison import compare
-from calibeam.results.reconciliation import reconcile, split
+from calibeam.results.reconciliation import reconcile
+from calibrate.compare.reconciled_rows import split
 from tests.calibeam.test_compare_simulations import EXAMPLES, NOISE_M, TRACKER, arm, session
 
 RIG = EXAMPLES / "rig.toml"

@@ -1,11 +1,10 @@
 """poses.csv and touched points, read with the row and column of every fault, and the rows of corrected.csv
 (docs/formats.md); besides the frame that is measured from touched points.
 
-Frames of a program, bases and work objects, are measured
-again with the arm as it really is: one that was taught with the uncorrected arm holds the error of that arm about its
-place, so corrected commands reach the frame as it is written, not the part. It is measured from points of it that the
-real tool touches: the motion that brings them best onto where the model has the tool. Source of its covariance: linear
-least squares.
+Frames of a program, bases and work objects, are measured again with the arm as it really is: one that was taught with
+the uncorrected arm holds the error of that arm about its place, so corrected commands reach the frame as it is written,
+not the part. It is measured from points of it that the real tool touches: the motion that brings them best onto where
+the model has the tool. Source of its covariance: linear least squares.
 """
 
 import csv

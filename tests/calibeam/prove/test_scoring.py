@@ -13,7 +13,7 @@ from calibeam.prove.record import CaseScore, Exact, FreeSpace, TrueDefect, TrueN
 from calibeam.prove.scenario import Scenario
 from calibeam.prove.scoring import score
 from calibeam.prove.seal import Layout
-from calibrate.compare.comparison import ComparisonFile, DifferenceRecord
+from calibrate.compare.comparison_file import ComparisonFile, DifferenceRecord
 from calibrate.diagnose.record.file import write_diagnosis
 from calibrate.diagnose.record.schema import (
     DiagnosisFile,

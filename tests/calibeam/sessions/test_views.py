@@ -14,11 +14,10 @@ from acquisition.session.records import Phase, Progress
 from calibeam.asking import Asking
 from calibeam.live.feed import SILENT
 from calibeam.live.feed import Progress as PageProgress
-from calibeam.sessions.forecast import Forecast
 from calibeam.sessions.keys import Keys
 from calibeam.sessions.person import Person
 from calibeam.sessions.reporter import ReportingJournal, StatusReporter
-from calibeam.sessions.status import Pace, SessionStatus, clock_words
+from calibeam.sessions.status import Forecast, Pace, SessionStatus, clock_words
 from calibeam.sessions.views import KEYS, PageView, PlainView, TerminalView, drawn
 from drivers.errors import DeviceLost
 

@@ -4,7 +4,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
-import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
@@ -20,14 +19,11 @@ from calibrate.compare.chain import (
     Pair,
     of_rig,
 )
+from calibrate.compare.comparison_file import Level, Mismatch, ReadingRecord
 from calibrate.compare.corrected import compared_session, corrected_samples, simulated_of
 from calibrate.compare.link_differs import (
     ALARM,
     ROUNDING,
-)
-from calibrate.compare.mismatches import (
-    Level,
-    Mismatch,
 )
 from calibrate.compare.own_noise import chance_of_structure
 from calibrate.diagnose.record.schema import DiagnosisFile
@@ -43,19 +39,8 @@ SEED = 1  # of nulls, splits and bootstraps: the same pair always gives the same
 FEWEST = 20  # samples of a search; fewer hold no more than the geometry
 
 
-class ReadingRecord(msgspec.Struct, frozen=True):
-    """Measured less simulated of one instrument, rms of a coordinate: as they stand, and after all that was found."""
-
-    instrument: str
-    unit: str
-    rows: int
-    rms_coordinate_before: float
-    rms_coordinate_after: float
-    noise: float | None
-
-
 @dataclass(frozen=True, eq=False)
-class Search:
+class Explanation:
     """What a search gave; `beside` None: it was not made, and `why` has the reason."""
 
     beside: Beside | None
@@ -73,7 +58,7 @@ def explain(
     made_of: ModelFile | None,
     *,
     diagnosed: bool,
-) -> tuple[Search, Predictor, Pair]:
+) -> tuple[Explanation, Predictor, Pair]:
     """What a search gives, the simulation's geometry, and the pair as if set up alike."""
     same = _same(pair)
     try:
@@ -81,12 +66,12 @@ def explain(
         here = simulation.model
         alike = pair if same else set_alike(simulation, pair)
     except (DataError, np.linalg.LinAlgError) as why:
-        return Search(None, (), None, (), f"no reading to compare: {why}"), of_rig(simulated.rig), pair
+        return Explanation(None, (), None, (), f"no reading to compare: {why}"), of_rig(simulated.rig), pair
     if not diagnosed or same:
-        return Search(None, (), None, (), None), here, alike
+        return Explanation(None, (), None, (), None), here, alike
     if len(pair[0]) < FEWEST:
         why = f"{len(pair[0])} samples are too few to explain a difference; {FEWEST} are needed"
-        return Search(None, (), None, (), why), here, alike
+        return Explanation(None, (), None, (), why), here, alike
     differing = [f"joint{j + 1}.zero" for j in np.flatnonzero(zeros_rad)]
     try:
         rng = np.random.default_rng(SEED)
@@ -97,14 +82,14 @@ def explain(
         samples = corrected_samples(simulation, pair, found.T_simulated_measured)
         before = begin(simulation, compared_session(simulated.rig, samples))
     except (DataError, np.linalg.LinAlgError) as why:
-        return Search(None, (), None, (), f"the difference could not be explained: {why}"), here, alike
+        return Explanation(None, (), None, (), f"the difference could not be explained: {why}"), here, alike
     if found.diagnosed.physics is None:
         why = f"the difference could not be explained: {found.diagnosed.why_not}"
-        return Search(None, (), None, (), why), here, alike
+        return Explanation(None, (), None, (), why), here, alike
     source = replace(measured, rig=simulated.rig, rig_text=simulated.rig_text, streams={}, events=())
     file = file_of(found.diagnosed, source)
     after = found.diagnosed.physics.model
-    return Search(found, tuple(_readings(before, after, file)), file, tuple(_left(after)), None), here, alike
+    return Explanation(found, tuple(_readings(before, after, file)), file, tuple(_left(after)), None), here, alike
 
 
 def _same(pair: Pair) -> bool:
@@ -121,7 +106,7 @@ def _same_column(one: NDArray[Any], other: NDArray[Any]) -> bool:
     return np.array_equal(one, other)
 
 
-def notes_of(asked: Search) -> Iterator[str]:
+def notes_of(asked: Explanation) -> Iterator[str]:
     """What was not compared, and why."""
     if asked.why is not None:
         yield asked.why

@@ -6,7 +6,6 @@
 from collections.abc import Mapping
 from dataclasses import replace
 
-import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
@@ -20,7 +19,16 @@ from calibrate.compare.chain import (
     columns_of,
     differences,
 )
-from calibrate.compare.explain import ReadingRecord, Search, explain, notes_of
+from calibrate.compare.comparison_file import (
+    ComparisonFile,
+    DifferenceRecord,
+    DroppedRecord,
+    Level,
+    Mismatch,
+    NameOfCause,
+    StreamRecord,
+)
+from calibrate.compare.difference_explained import Explanation, explain, notes_of
 from calibrate.compare.link_differs import (
     ROUNDING,
     Parted,
@@ -32,20 +40,16 @@ from calibrate.compare.matched import (
     match,
     zeros_between,
 )
-from calibrate.compare.mismatches import (
-    Level,
-    Mismatch,
-    mismatches,
-)
+from calibrate.compare.mismatches import mismatches
 from calibrate.compare.rig_and_streams import SAYS, joint_mismatches, rig_mismatches, stream_mismatches, zero_mismatches
-from calibrate.compare.rig_keys import RigKey, rig_differences
+from calibrate.compare.rig_keys import rig_differences
 from calibrate.compare.streams import (
     StreamPair,
     late_against_joints,
     stream_pairs,
 )
 from calibrate.diagnose.doubts import Named, Verdict
-from calibrate.diagnose.record.schema import DiagnosisFile, SizeRecord
+from calibrate.diagnose.record.schema import SizeRecord
 from calibrate.diagnose.streams import devices_of
 from calibrate.errors import DataError
 from calibrate.fit.identify.identify import wrong_file
@@ -55,82 +59,6 @@ from calibrate.model.model_file import ModelFile
 Floats = NDArray[np.float64]
 READING = tuple(reading.link for reading in READINGS)
 EXPLAINED = (*READING, "encoders")  # links whose differences are asked of the model
-
-
-class NameOfCause(msgspec.Struct, frozen=True):
-    """An alternative explanation."""
-
-    where: str
-    physics: str
-
-
-class DifferenceRecord(msgspec.Struct, frozen=True):
-    """One difference, measured less simulated, the unit of each size in its name."""
-
-    level: str
-    where: str
-    physics: str
-    sizes: dict[str, SizeRecord]
-    side: str
-    decides: bool
-    p: float | None
-    says: str
-    alternatives: tuple[NameOfCause, ...]
-    simulated: dict[str, float]  # with the structure of the simulation: its own values of these parameters
-
-
-class DroppedRecord(msgspec.Struct, frozen=True):
-    """A constant that is no difference: left as in the simulation, to within these sizes, which widen the others'."""
-
-    where: str
-    physics: str
-    sizes: dict[str, SizeRecord]  # by the names of model.json
-
-
-class StreamRecord(msgspec.Struct, frozen=True):
-    """One device's stream in both recordings."""
-
-    stream: str
-    unit: str
-    status: str
-    offset_s: float | None  # simulated clock less measured clock, at `middle_s` of the measured one
-    offset_sigma_s: float | None
-    drift: float | None
-    drift_sigma: float | None
-    middle_s: float
-    samples: int
-    level: tuple[float, ...] | None
-    rms: float | None
-    noise: float | None
-    largest: float | None
-    largest_s: float | None
-    parts: bool | None
-    later_than_joints_s: float | None
-    later_than_joints_sigma_s: float | None
-
-
-class ComparisonFile(msgspec.Struct, frozen=True):
-    """Everything; `first_link` is None where nothing parts."""
-
-    schema: int
-    kind: str
-    software: str
-    measured: str
-    simulated: str
-    matched: int
-    only_measured_t_s: tuple[float, ...]
-    only_simulated_t_s: tuple[float, ...]
-    verdict: str
-    says: str
-    rig: tuple[RigKey, ...]
-    differences: tuple[DifferenceRecord, ...]
-    dropped: tuple[DroppedRecord, ...]
-    readings: tuple[ReadingRecord, ...]
-    first_link: str | None
-    links: tuple[Parted, ...]
-    streams: tuple[StreamRecord, ...]
-    notes: tuple[str, ...]
-    diagnosis: DiagnosisFile | None
 
 
 def compare(
@@ -223,7 +151,7 @@ def _without_zeros(pair: Pair, zeros_rad: Floats) -> Samples:
     return columns_of(pair[0], {n: pair[0].column(n) - zeros_rad[j] for j, n in enumerate(names)})
 
 
-def _as_explained(one: Parted, asked: Search, explained: bool, measured: Samples) -> Parted:
+def _as_explained(one: Parted, asked: Explanation, explained: bool, measured: Samples) -> Parted:
     """After a search a reading parts where it found something; noise is what it found, not what was assumed."""
     if asked.beside is None or one.link not in EXPLAINED:
         return one
@@ -233,7 +161,7 @@ def _as_explained(one: Parted, asked: Search, explained: bool, measured: Samples
     return one if one.parts else replace(one, parts=one.largest_own > ROUNDING, first_t_s=first_t_s)
 
 
-def _verdict(found: list[Mismatch], parted: tuple[Parted, ...], asked: Search) -> Verdict:
+def _verdict(found: list[Mismatch], parted: tuple[Parted, ...], asked: Explanation) -> Verdict:
     """No line above it may contradict it."""
     deciding = [one for one in found if one.decides]
     if any(one.level is not Level.UNEXPLAINED for one in deciding):
@@ -245,7 +173,7 @@ def _verdict(found: list[Mismatch], parted: tuple[Parted, ...], asked: Search) -
     return Verdict.CONSISTENT if asked.why is None else Verdict.UNDECIDABLE
 
 
-def _says(verdict: Verdict, found: list[Mismatch], asked: Search) -> str:
+def _says(verdict: Verdict, found: list[Mismatch], asked: Explanation) -> str:
     deciding = [one for one in found if one.decides]
     anew = "; what is set up again for every recording is taken into account" if len(deciding) < len(found) else ""
     if verdict is Verdict.CONSISTENT:
@@ -261,7 +189,7 @@ def _says(verdict: Verdict, found: list[Mismatch], asked: Search) -> str:
     return f"Measured and simulated differ: {many} ({', '.join(levels)}){_how_far(asked)}.{left}"
 
 
-def _how_far(asked: Search) -> str:
+def _how_far(asked: Explanation) -> str:
     if not asked.readings:
         return ""
     first = asked.readings[0]
