@@ -19,7 +19,7 @@ from calibeam.prove.unseen import read_asked, tool_at
 from calibrate.diagnose.doubts.findings import (
     named,
 )
-from calibrate.diagnose.doubts.folds import (
+from calibrate.diagnose.doubts.unseen_rows import (
     splits_of,
 )
 from calibrate.diagnose.record.file import (

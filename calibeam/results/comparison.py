@@ -38,6 +38,7 @@ from calibrate.compare.link_differs import (
     ALARM,
     ROUNDING,
     Parted,
+    chance_of_structure,
     judged,
 )
 from calibrate.compare.matched import (
@@ -52,7 +53,6 @@ from calibrate.compare.mismatches import (
     Side,
     mismatches,
 )
-from calibrate.compare.own_noise import chance_of_structure
 from calibrate.compare.rig_keys import RigKey, rig_differences
 from calibrate.compare.streams import (
     NoiseDifference,

@@ -24,10 +24,10 @@ from calibeam.simulation.replayed_recording import Replayed, replay
 from calibeam.software import SOFTWARE
 from calibrate.compare.beside_simulation import device_between
 from calibrate.compare.corrected import corrected_samples, simulated_of
-from calibrate.compare.matched import match
-from calibrate.compare.seated import is_seated
+from calibrate.compare.matched import is_seated, match
+from calibrate.diagnose import limits
 from calibrate.diagnose.doubts import Verdict
-from calibrate.diagnose.from_recording import FEWEST, Diagnosed
+from calibrate.diagnose.from_recording import Diagnosed
 from calibrate.diagnose.record.schema import DiagnosisFile
 from calibrate.diagnose.state import session_of
 from calibrate.diagnose.with_model import model_of_diagnosis, model_of_fit
@@ -211,7 +211,7 @@ def _of_few(
 ) -> Reconciled:
     """What all rows show without a diagnosis: how far apart the two are, and whether noise alone may do it."""
     beyond = [one for one in found if one.stated_m is not None and one.low_m > AGREES * one.stated_m]
-    poses, needed = int(_poses(measured.samples).max()) + 1, round(FEWEST / (1.0 - UNSEEN))
+    poses, needed = int(_poses(measured.samples).max()) + 1, round(limits.FEWEST_SAMPLES / (1.0 - UNSEEN))
     rows = f"{counted(len(measured.samples), 'row')} in {counted(poses, 'pose')}"
     open_ = f"{rows}: what the simulation lacks cannot be decided; about {needed} poses are needed"
     far = "; ".join(
@@ -310,7 +310,7 @@ def split(samples: Samples, seed: int) -> tuple[Ints, Ints]:
 
 
 def _enough(seen: Ints, unseen: Ints) -> bool:
-    return len(seen) >= FEWEST and len(unseen) >= FEWEST_UNSEEN
+    return len(seen) >= limits.FEWEST_SAMPLES and len(unseen) >= FEWEST_UNSEEN
 
 
 def _poses(samples: Samples) -> Ints:

@@ -18,9 +18,9 @@ from calibrate.diagnose.doubts.diagnosis import (
     RivalName,
 )
 from calibrate.diagnose.doubts.doubt import Doubted, doubted
-from calibrate.diagnose.doubts.drifts import parted_by_time
 from calibrate.diagnose.doubts.findings import named
-from calibrate.diagnose.doubts.proof import floors, proofs
+from calibrate.diagnose.doubts.missing_columns import parted_by_time
+from calibrate.diagnose.doubts.unseen_rows import floors, proofs
 from calibrate.diagnose.search.bench import recent_menu
 from calibrate.diagnose.search.noise_law import noise_law
 from calibrate.diagnose.search.searching import Search

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from acquisition.recording import Recording
 from acquisition.recording.rig import rig_sha256
+from calibrate.diagnose.doubts.detection_limits import Smallest, isolability, smallest_visible
 from calibrate.diagnose.doubts.diagnosis import (
     Diagnosis,
     Finding,
@@ -19,10 +20,8 @@ from calibrate.diagnose.doubts.diagnosis import (
     Verdict,
 )
 from calibrate.diagnose.doubts.findings import named
-from calibrate.diagnose.doubts.isolability import isolability
-from calibrate.diagnose.doubts.proof import Floor, HeldOut
-from calibrate.diagnose.doubts.smallest_visible import Smallest, smallest_visible
 from calibrate.diagnose.doubts.stated_noise import NoiseFound
+from calibrate.diagnose.doubts.unseen_rows import Floor, HeldOut
 from calibrate.diagnose.from_recording import Diagnosed, Physics
 from calibrate.diagnose.record.schema import (
     SCHEMA,

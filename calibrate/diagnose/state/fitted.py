@@ -12,6 +12,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from calibrate.diagnose import limits
 from calibrate.diagnose.state.assumed import Assumed
 from calibrate.diagnose.state.augmented import Around, Augmented, plain_sizes
 from calibrate.diagnose.state.in_sight import in_sight, solve_in_sight
@@ -52,17 +53,7 @@ from calibrate.model.with_effects.driver_values import as_before
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 
-TURNS = 40  # of weights and least squares; most settle in 5 to 8
-FEWEST_TURNS = 4
-REFRESHED = 2  # turns after which drivers have settled: what a nanometre changes in them decides nothing
-STEPS = 12  # of a solver in a turn: the next one goes on from there
-TOLERANCE = 0.02  # of chi2 in a turn: less than what settles the likelihood
-LAST = 1e-3  # the same in the turn that ends a fit, 3 % of a sigma
 DAMPING = 1e-9  # of the first step: along what the data see it is a Gauss-Newton step
-WILD = 0.1  # weight of a row that may have bent a plain fit
-SWALLOWED = 0.3  # weight of a row that next to nothing of a model follows: five sigmas off
-SETTLED = 0.1  # of -2 log L: far below any difference that decides
-CREEPING = SETTLED / TURNS  # the same in a turn: as many as there are would not bring it beyond that
 AT_REST = (Stop.GAIN, Stop.ROUNDING)  # of a solver that found the least squares of its weights
 PLACES = ("placement", seat.POINTS, point_line.POINTS)  # of where something stood; a place may be met unseen
 
@@ -110,7 +101,7 @@ class Fitted:
 
     @property
     def distrusted(self) -> int:
-        return sum(int(np.sum(s.weights < SWALLOWED)) for s in self.scatters)
+        return sum(int(np.sum(s.weights < limits.DISTRUSTED_WEIGHT)) for s in self.scatters)
 
     def trusting(self) -> "Fitted":
         noise = self.noise.trusted
@@ -303,9 +294,11 @@ def fit_geometry(session: Session, active: Ints | None = None) -> Fitted:
     fits: list[Fitted] = []
     for loss in (Loss.SQUARE, Loss.HUBER):
         seen = in_sight(problem, session.start)
-        rough = solve_in_sight(problem, session.start, seen, damping=FAR_START, tolerance=TOLERANCE, loss=loss)
+        rough = solve_in_sight(
+            problem, session.start, seen, damping=FAR_START, tolerance=limits.TURN_TOLERANCE, loss=loss
+        )
         fits.append(_settled(_turn(problem, chosen, rough.theta, noise_of(problem, rough))))
-        if all(np.all(s.weights > WILD) for s in fits[0].scatters):
+        if all(np.all(s.weights > limits.UNTRUSTED_WEIGHT) for s in fits[0].scatters):
             break
     return min(fits, key=lambda fit: fit.minus_two_log_likelihood)
 
@@ -345,28 +338,36 @@ def _settled(fitted: Fitted, renewing: bool = False) -> Fitted:
     every turn predicts them, the last one as good as its own, which a likelier turn under others would not be.
     """
     best, resting = fitted, False
-    for turn in range(1, TURNS):
+    for turn in range(1, limits.FIT_TURNS):
         last, problem = fitted, fitted.problem
-        anew = resting or turn + 1 == FEWEST_TURNS
+        anew = resting or turn + 1 == limits.FEWEST_TURNS
         problem = problem.forgetting() if anew else problem
-        if fitted.problem.terms and (renewing or turn <= REFRESHED):
+        if fitted.problem.terms and (renewing or turn <= limits.REFRESHED_TURNS):
             problem = problem.refreshed(last.predicted if renewing else last.drivers)
-        new = _turn(problem, fitted.active, fitted.values, fitted.noise, LAST if anew else TOLERANCE)
+        new = _turn(
+            problem,
+            fitted.active,
+            fitted.values,
+            fitted.noise,
+            limits.LAST_TOLERANCE if anew else limits.TURN_TOLERANCE,
+        )
         fitted = replace(new, steps=fitted.steps + new.steps)
         best = fitted if renewing else min(best, fitted, key=lambda fit: fit.minus_two_log_likelihood)
         gained = last.minus_two_log_likelihood - fitted.minus_two_log_likelihood
-        least = SETTLED if new.stop in AT_REST else CREEPING
-        resting = turn + 1 >= FEWEST_TURNS and abs(gained) < least
+        least = limits.SETTLED if new.stop in AT_REST else limits.CREEPING
+        resting = turn + 1 >= limits.FEWEST_TURNS and abs(gained) < least
         if resting and anew:
             return replace(best, steps=fitted.steps, stop=Stop.LIKELIHOOD if new.stop in AT_REST else Stop.ROUNDS)
     return replace(best, steps=fitted.steps, stop=Stop.ROUNDS)
 
 
-def _turn(problem: Augmented, active: Ints, start: Floats, noise: Noise, tolerance: float = TOLERANCE) -> Fitted:
+def _turn(
+    problem: Augmented, active: Ints, start: Floats, noise: Noise, tolerance: float = limits.TURN_TOLERANCE
+) -> Fitted:
     """Least squares under the noise so far, along what the data see, then the noise that is left."""
     problem = noise.under(problem)
     seen = in_sight(problem, start)
-    fit = solve_in_sight(problem, start, seen, damping=DAMPING, max_steps=STEPS, tolerance=tolerance)
+    fit = solve_in_sight(problem, start, seen, damping=DAMPING, max_steps=limits.SOLVER_STEPS, tolerance=tolerance)
     noise = noise_of(problem, fit)
     return Fitted(problem.session, active, problem, fit.theta, noise, fit.covariance, fit.steps, fit.stop)
 

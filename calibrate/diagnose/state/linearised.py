@@ -10,14 +10,13 @@ from typing import Protocol, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from calibrate.diagnose import limits
 from calibrate.fit.noise import sigma_about_zero
 from calibrate.model.effects.drivers import Drivers
 from calibrate.model.effects.term import Accepted, Term
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
-
-WILD = 6.0  # sigmas
 
 
 @dataclass(frozen=True)
@@ -52,7 +51,7 @@ def tame(misfit: Floats, least: float) -> NDArray[np.bool_]:
     is to blame for. Where each would be wild, the spread shows nothing, and none is.
     """
     spread = max(float(sigma_about_zero(misfit)), least)
-    near = np.max(np.abs(misfit), axis=1) <= WILD * spread
+    near = np.max(np.abs(misfit), axis=1) <= limits.OUTLYING_SIGMAS * spread
     return near | ~np.any(near)
 
 

@@ -12,6 +12,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from calibrate.diagnose import limits
 from calibrate.diagnose.state.linearised import Rows, State
 from calibrate.model.effects.term import Term
 
@@ -19,8 +20,6 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 K = TypeVar("K")
 
-VISIBLE = 1e-5  # share of a column's square; below it the poses do not show the effect
-BLIND = 2e-3  # of the largest lever of a joint: a millimetre or two, where other errors of the arm count as a turn
 RANK = 1e-10  # of the largest singular value of the scaled geometry
 
 
@@ -58,7 +57,7 @@ def blind(levers: Mapping[K, float]) -> tuple[K, ...]:
     Their lever is what errors elsewhere leave there: a size over it is no angle of the joint.
     """
     most = max(levers.values(), default=0.0)
-    return tuple(one for one, size in levers.items() if size < BLIND * most)
+    return tuple(one for one, size in levers.items() if size < limits.BLIND * most)
 
 
 @dataclass(frozen=True)
@@ -99,7 +98,7 @@ class Menu:
         shown = np.zeros(len(self.terms), dtype=bool)
         for block in self.blocks:
             share = np.max(np.diagonal(block.gram, axis1=1, axis2=2), axis=1)
-            for entry in block.entries[share > VISIBLE]:
+            for entry in block.entries[share > limits.VISIBLE]:
                 shown[self.entries[entry].term] = True
         return tuple(term for term, seen in zip(self.terms, shown, strict=True) if not seen)
 

@@ -6,13 +6,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from calibrate.diagnose.streams.between_encoders import Causes
+from calibrate.diagnose.streams import limits
 from calibrate.diagnose.streams.clock import ClockFit, ClockStatus, clock_between
-from calibrate.diagnose.streams.clock_steps import judged, shares_host_clock
+from calibrate.diagnose.streams.clock_faults import judged, lateness, shares_host_clock
 from calibrate.diagnose.streams.coarse_clock import Ticks
 from calibrate.diagnose.streams.continuity import Fault, breaks
-from calibrate.diagnose.streams.finding import Outcome, StreamFinding
-from calibrate.diagnose.streams.findings_of import (
+from calibrate.diagnose.streams.following import Following, following
+from calibrate.diagnose.streams.recorded import Device, by_host, start_between
+from calibrate.diagnose.streams.ringing import Levers, ringing
+from calibrate.diagnose.streams.settling import Stand, Window, stands_of, unsettled
+from calibrate.diagnose.streams.slips import Causes, slips
+from calibrate.diagnose.streams.stream_findings import (
+    StreamFinding,
     told_breaks,
     told_following,
     told_late,
@@ -21,22 +26,12 @@ from calibrate.diagnose.streams.findings_of import (
     told_slip,
     told_unsettled,
 )
-from calibrate.diagnose.streams.following import SMALLEST_S, Following, following
-from calibrate.diagnose.streams.lateness import lateness
-from calibrate.diagnose.streams.recorded import Device, start_between
-from calibrate.diagnose.streams.ringing import Levers, ringing
-from calibrate.diagnose.streams.sample_times import by_host
-from calibrate.diagnose.streams.settling import Window, unsettled
-from calibrate.diagnose.streams.slips import slips
-from calibrate.diagnose.streams.stands import Stand, stands_of
-from calibrate.diagnose.streams.track import SIGMA_OF_MEDIAN, Track
+from calibrate.diagnose.streams.track import SIGMA_OF_MEDIAN, Outcome, Track
 
 Floats = NDArray[np.float64]
 Predicted = Callable[[Floats, Floats], Floats]  # (row, joint) rad and (row,) joints' clock -> (row, 4) spots, NaN: none
 
-SERVO_S = 0.05  # after the set-point stands, before what still swings is called ringing: a usual servo's own settling
 NUDGE_RAD = 1e-5  # of a joint, for its lever on the spots: far below what bends the beam's path
-FEWEST_JOINTS = 3  # whose common lag is the clock's
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,7 +121,7 @@ def _encoders(
         return _by_stamps(joints, encoders, stands, causes) if shares_host_clock(encoders) else (fit, [])
     lags = following(joints.track, _moved(encoders.track, fit))
     alike = _alike(lags)
-    if len(alike) >= FEWEST_JOINTS and any(one.outcome is Outcome.FOUND for one in lags):
+    if len(alike) >= limits.LAGGING_TOGETHER and any(one.outcome is Outcome.FOUND for one in lags):
         # one late joint pulls the common clock: what most joints share is the clock, the rest is that joint's own
         again = clock_between(_of(joints.track, alike), _of(encoders.track, alike), start_between(joints, encoders))
         fit = fit if again.offset_s is None else again
@@ -171,7 +166,7 @@ def _alike(lags: Sequence[Following]) -> list[int]:
         return []
     usual = float(np.median(list(behind.values())))
     scatter = SIGMA_OF_MEDIAN * float(np.median([abs(b - usual) for b in behind.values()]))
-    return [c for c, b in behind.items() if abs(b - usual) <= max(3.0 * scatter, SMALLEST_S)]
+    return [c for c, b in behind.items() if abs(b - usual) <= max(3.0 * scatter, limits.BEHIND_S)]
 
 
 def _of(track: Track, channels: list[int]) -> Track:
@@ -195,7 +190,7 @@ def _spots(joints: Device, spots: Device, stands: tuple[Stand, ...], predicted: 
     model = Track("predicted spots", "m", track.time_s, predicted(track.values, track.time_s))
     fit = clock_between(model, spots.track, start_between(joints, spots))
     at_joints = _moved(spots.track, fit) if fit.offset_s is not None else by_stamps
-    rings = ringing(at_joints, stands, levers_of(track, predicted), SERVO_S)
+    rings = ringing(at_joints, stands, levers_of(track, predicted), limits.SERVO_S)
     return _Spots(at_joints, fit, [told_ringing(at_joints, rings)] if rings.stops else [])
 
 
@@ -236,5 +231,5 @@ def _moved(track: Track, fit: ClockFit) -> Track:
 
 def _rings(track: Track, stands: tuple[Stand, ...]) -> list[StreamFinding]:
     """Of angles: every joint turns its own reading only."""
-    rings = ringing(track, stands, lambda _: np.eye(track.channels), SERVO_S)
+    rings = ringing(track, stands, lambda _: np.eye(track.channels), limits.SERVO_S)
     return [told_ringing(track, rings)] if rings.stops else []

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.recording import Recording, Stream
+from calibrate.diagnose.streams import limits
 from calibrate.diagnose.streams.coarse_clock import Ticks, straight_line
 from calibrate.diagnose.streams.track import SIGMA_OF_MEDIAN, Track
 
@@ -16,8 +17,6 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 COMMAND, JOINTS, ENCODERS, CURRENTS = "target_q_rad", "actual_q_rad", "position_rad", "photocurrent_a"
-DARK = 0.2  # of the usual light: a beam half off a face falls from full to nothing within its own width
-WINDOWS = 30  # of host time, in each of which the promptest stamp counts
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,7 +85,7 @@ def _spots(recording: Recording) -> Device | None:
     with np.errstate(invalid="ignore", divide="ignore"):
         spot = fixture.half_size_m * (current[..., 1] - current[..., 0]) / total
     usual = np.nanpercentile(total, 90.0, axis=0)
-    dark = np.any(~(total > DARK * usual), axis=(1, 2))
+    dark = np.any(~(total > limits.DARK * usual), axis=(1, 2))
     values = np.where(dark[:, None], np.nan, spot.reshape(-1, 4))
     return Device(Track("spots", "m", stream.device_s, values), stream.sequence, stream.host_s)
 
@@ -94,7 +93,7 @@ def _spots(recording: Recording) -> Device | None:
 def _host_line(device: Device) -> tuple[float, float] | None:
     """Level and rate of host = level + rate device, through the least delayed stamps."""
     prompt = _prompt(device)
-    if len(prompt) < WINDOWS // 2:
+    if len(prompt) < limits.PROMPT_WINDOWS // 2:
         return None
     level, rate = straight_line(device.track.time_s[prompt], device.host_s[prompt])
     return (level, rate) if rate > 0.0 else None
@@ -103,9 +102,15 @@ def _host_line(device: Device) -> tuple[float, float] | None:
 def _prompt(device: Device) -> list[int]:
     """The sample of each window that came least late."""
     t, host = device.track.time_s, device.host_s
-    if len(t) < 4 * WINDOWS or not np.ptp(t) > 0.0 or not np.ptp(host) > 0.0:
+    if len(t) < 4 * limits.PROMPT_WINDOWS or not np.ptp(t) > 0.0 or not np.ptp(host) > 0.0:
         return []
     late = host - np.ptp(host) / np.ptp(t) * t
-    edges = np.linspace(t[0], t[-1], WINDOWS + 1)
+    edges = np.linspace(t[0], t[-1], limits.PROMPT_WINDOWS + 1)
     at = (np.flatnonzero((t >= a) & (t <= b)) for a, b in pairwise(edges))
     return [int(rows[np.argmin(late[rows])]) for rows in at if len(rows)]
+
+
+def by_host(time_s: Floats, own: Device, other: Device) -> Floats:
+    """Times of `own` on the clock of `other`, by the host's stamps of both: good to what the lines delay."""
+    host_s = np.interp(time_s, own.track.time_s, np.maximum.accumulate(own.host_s))
+    return np.interp(host_s, np.maximum.accumulate(other.host_s), other.track.time_s)

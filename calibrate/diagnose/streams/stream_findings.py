@@ -1,19 +1,36 @@
 """What the finders found, as findings with the words of docs/formats.md."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from calibrate.diagnose.doubts.diagnosis import Named
+from calibrate.diagnose.streams import limits
+from calibrate.diagnose.streams.clock_faults import Late
 from calibrate.diagnose.streams.continuity import Break, Fault
-from calibrate.diagnose.streams.finding import Outcome, StreamFinding
 from calibrate.diagnose.streams.following import Following
-from calibrate.diagnose.streams.lateness import Late
 from calibrate.diagnose.streams.ringing import Ringing
 from calibrate.diagnose.streams.settling import Unsettled, Window
 from calibrate.diagnose.streams.slips import Slip
-from calibrate.diagnose.streams.track import Track
+from calibrate.diagnose.streams.track import Outcome, Track
 from calibrate.model.effects.term import Size, with_sigma
+
+
+@dataclass(frozen=True)
+class StreamFinding:
+    """One cause in a stream. `p`: of nothing at all looking like this; times on the clock of the named stream."""
+
+    name: Named
+    stream: str
+    outcome: Outcome
+    parameters: Mapping[str, Size]
+    from_s: float | None
+    to_s: float | None
+    p: float
+    says: str
+    rivals: tuple[Named, ...] = ()
+
 
 SAID = {
     Fault.MISSED: "{n} samples of {stream} are missing at {at}",
@@ -23,7 +40,6 @@ SAID = {
     Fault.FROZEN: "{n} samples of {stream} are one and the same{of}, while it moved, at {at}",
 }
 CERTAIN = float(np.finfo(float).tiny)  # of what was counted: no noise does it, and no probability is zero
-MOST = 8  # rows that are printed one by one
 
 
 def told_breaks(track: Track, faults: Sequence[Break]) -> list[StreamFinding]:
@@ -74,7 +90,9 @@ def told_unsettled(track: Track, windows: Sequence[Window], each: Sequence[Unset
     for name, values in (("left_share", share), ("tau_s", tau_s)):
         if len(values):
             sizes[name] = Size(float(np.median(values)), float(np.std(values) / np.sqrt(len(values))))
-    rows = ", ".join(str(k + 1) for k, _, _ in found[:MOST]) + (", ..." if len(found) > MOST else "")
+    rows = ", ".join(str(k + 1) for k, _, _ in found[: limits.PRINTED_ROWS]) + (
+        ", ..." if len(found) > limits.PRINTED_ROWS else ""
+    )
     says = (
         f"{len(found)} of {len(windows)} samples (rows {rows}) were taken before the arm had settled: "
         f"up to {1e6 * largest:.3g} µ{track.unit} of the {track.name} were still to come"
