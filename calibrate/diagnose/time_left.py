@@ -16,7 +16,7 @@ from calibrate.diagnose import limits
 from calibrate.diagnose.search.bench import Bench
 from calibrate.diagnose.search.noise_law import NoiseLaw, capture_orders, noise_law
 from calibrate.diagnose.search.null import Tail
-from calibrate.diagnose.state.linearised import Rows
+from calibrate.diagnose.state.linearised import WhitenedRows
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
@@ -82,7 +82,7 @@ def _short(law: NoiseLaw) -> NoiseLaw:
 Value = Callable[[Floats], Floats]  # (draw, row) of residuals behind geometry -> (draw,)
 
 
-def _level(rows: Rows, t_s: Floats) -> Value:
+def _level(rows: WhitenedRows, t_s: Floats) -> Value:
     """Squares that a change of every channel's mean explains at the moment that suits it best, over the mean square."""
     orders = capture_orders(rows, t_s)
 

@@ -24,7 +24,7 @@ from calibrate.diagnose.doubts.diagnosis import Named
 from calibrate.diagnose.doubts.findings import NO_SIZE, named
 from calibrate.diagnose.search.bench import Bench
 from calibrate.diagnose.search.score import directions
-from calibrate.diagnose.state.visible import Block, Menu
+from calibrate.diagnose.state.visible import EntryBlock, Menu
 from calibrate.model.effects.term import Term
 
 Floats = NDArray[np.float64]
@@ -100,7 +100,7 @@ def _is_middle(bench: Bench, i: int) -> bool:
     return all(value == grid[len(grid) // 2] for value, grid in zip(entry.inner, grids, strict=True))
 
 
-def _coefficients(block: Block, at: int, needed: float) -> Floats | None:
+def _coefficients(block: EntryBlock, at: int, needed: float) -> Floats | None:
     """(k,) which together show the needed square; None where they show nothing."""
     seen = np.maximum(np.diag(block.gram[at]), 0.0)  # below zero by rounding where geometry can be all of it
     if not np.any(seen > shared_limits.VISIBLE):

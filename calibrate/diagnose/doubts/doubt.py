@@ -37,7 +37,7 @@ from calibrate.diagnose.doubts.diagnosis import (
 from calibrate.diagnose.doubts.findings import bare_findings, findings_of, named
 from calibrate.diagnose.doubts.lack_of_fit import LackOfFit, lack_of_fit
 from calibrate.diagnose.doubts.missing_columns import TIME, suspects
-from calibrate.diagnose.doubts.missing_columns import untold as drift_untold
+from calibrate.diagnose.doubts.missing_columns import untold as drift_not_determined
 from calibrate.diagnose.doubts.rivals import Rival, price, rivals_of
 from calibrate.diagnose.doubts.unknown import with_unknowns
 from calibrate.diagnose.doubts.unrecorded import Unrecorded, unrecorded
@@ -68,7 +68,7 @@ Ints = NDArray[np.intp]
 
 
 @dataclass(frozen=True, eq=False)
-class Doubted:
+class Assessed:
     """A model, its findings and what is left over."""
 
     at: Search
@@ -85,13 +85,13 @@ class Doubted:
         return Verdict.UNDECIDABLE if self.unexplained or self.undecided else Verdict.CONSISTENT
 
 
-def doubted(
+def assessed(
     state: State,
     rng: Generator,
     missing: Sequence[Missing] = (),
     stages: Stages | None = None,
-    known: Callable[[Doubted], None] | None = None,
-) -> Doubted:
+    known: Callable[[Assessed], None] | None = None,
+) -> Assessed:
     """Of a state with geometry fitted and no terms; `missing`: what effects of the catalogue lack in this record.
 
     `stages` keeps what fails; `known` is called once as soon as the causes are known, before alternatives and sizes.
@@ -100,7 +100,7 @@ def doubted(
     few = _found(state, rng, stages)
     at = _of_all(few, state)
     if known is not None:
-        known(Doubted(at, bare_findings(at), (), None, (), undecided=True))
+        known(Assessed(at, bare_findings(at), (), None, (), undecided=True))
     nameless = tuple(() for _ in few.state.accepted)
     few, rivals = stages.attempt(Stage.ALTERNATIVES, lambda: _named_best(few), (few, nameless))
     whole = at if at.keys == few.keys else _of_all(few, state)
@@ -126,8 +126,8 @@ def doubted(
     lacking += [m for _, hidden in drifts for m in hidden]
     if left and not lacking:
         lacking = list(missing)
-    unexplained = (*left, *(drift_untold(f, hidden) for f, hidden in drifts))
-    return Doubted(at, findings, unexplained, misfit, records(lacking), stages.undecided)
+    unexplained = (*left, *(drift_not_determined(f, hidden) for f, hidden in drifts))
+    return Assessed(at, findings, unexplained, misfit, records(lacking), stages.undecided)
 
 
 def _found(state: State, rng: Generator, stages: Stages) -> Search:

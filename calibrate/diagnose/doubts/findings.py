@@ -105,8 +105,8 @@ def _unsure(at: Search, i: int, finding: Finding, predicts: Floats) -> Finding:
     """The unknown cause in the place of a name that is hardly likely, or of no certain size. The name stays among what
     it could be; all names together are no more likely than not.
     """
-    found, doubted = unknown_cause(at, (i,), predicts), finding.believed(NOT_FINAL)
-    rivals = (RivalName(doubted.name, doubted.confidence, 0.0, refitted=True), *doubted.rivals)
+    found, assessed = unknown_cause(at, (i,), predicts), finding.believed(NOT_FINAL)
+    rivals = (RivalName(assessed.name, assessed.confidence, 0.0, refitted=True), *assessed.rivals)
     left = max(found.confidence - sum(rival.confidence for rival in rivals), 0.0)
     return replace(found, confidence=left, rivals=rivals, variant=finding.variant)
 

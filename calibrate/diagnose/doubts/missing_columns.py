@@ -44,7 +44,7 @@ def suspects(name: Named, missing: Sequence[Missing]) -> tuple[Missing, ...]:
     return tuple(out)
 
 
-def parted_by_time(one: Named, other: Named) -> bool:
+def separated_by_time(one: Named, other: Named) -> bool:
     """Whether two names differ in what they follow along the session only: no pose separates them."""
     return one.where == other.where and all(map(is_slow_cause, (*one.depends_on, *other.depends_on)))
 

@@ -48,15 +48,15 @@ class Case:
 
 def with_unknowns(at: Search) -> Search:
     """Names replaced where an open family forbids them, curves added where structure remains."""
-    before, given_up, vain = at.keys, frozenset[Keys](), frozenset[Key]()
+    before, given_up, vanished = at.keys, frozenset[Keys](), frozenset[Key]()
     for _ in range(limits.UNKNOWN_ROUNDS):
         changed, gone = _forbidden(at, open_families(at.bench), given_up)
         given_up |= gone
-        changed = _filled(changed, vain, grown=changed is at)
+        changed = _filled(changed, vanished, grown=changed is at)
         if changed is at:
             break
         new = grown_out(changed)
-        vain |= changed.keys - new.keys  # added, and gone again: the next round would do the same
+        vanished |= changed.keys - new.keys  # added, and gone again: the next round would do the same
         at = at if new.keys == at.keys else new
     return at if at.keys == before else settled(at)
 
@@ -128,14 +128,14 @@ def cancel(bench: Bench, group: Sequence[int]) -> bool:
     return bool(total @ total < search_limits.CANCELS * sum(float(f @ f) for f in felt))
 
 
-def _filled(at: Search, vain: frozenset[Key], grown: bool) -> Search:
-    """With open terms, none of them `vain`, for structure that is significant against the null of all open families.
+def _filled(at: Search, vanished: frozenset[Key], grown: bool) -> Search:
+    """With open terms, none of them `vanished`, for structure that is significant against the null of all open terms.
 
     `grown`: no name is left that could be added; else a curve has to be better than any, too.
     """
     for turn in range(limits.CURVES_IN_A_ROW):
         least = 0.0 if grown and turn == 0 else _best_name(at) + limits.UNKNOWN_BEATS_NAME
-        more = _remaining(at, vain, least)
+        more = _remaining(at, vanished, least)
         if more is None:
             return at
         at = more
@@ -156,14 +156,14 @@ def _p_of(at: Search, families: Families, law: NoiseLaw, offer: Offer, allowed: 
     return Tail(families.maxima(left, allowed)).p(offer.gain)
 
 
-def _remaining(at: Search, vain: frozenset[Key], least: float) -> Search | None:
-    """With the best open term of more than the `least` gain that is not `vain`."""
+def _remaining(at: Search, vanished: frozenset[Key], least: float) -> Search | None:
+    """With the best open term of more than the `least` gain that is not `vanished`."""
     families = open_families(at.bench)
     law = noise_law(at.state.rows, at.bench.sight, at.state.drivers.t_s, at.rng)
     free = _beside([a.term for a in at.state.accepted])
 
     def allowed(term: Term) -> bool:
-        return free(term) and term.key not in vain and not (law.wanders and is_slow(term))
+        return free(term) and term.key not in vanished and not (law.wanders and is_slow(term))
 
     offer = families.best(None, allowed, least)
     p = 1.0 if offer is None else _p_of(at, families, law, offer, allowed)

@@ -13,7 +13,7 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 
 from calibrate.diagnose.doubts import limits
-from calibrate.diagnose.state.linearised import State, Unseen, tame
+from calibrate.diagnose.state.linearised import State, UnseenRows, tame
 from calibrate.fit.held_out import Split, by_place, last_block
 from calibrate.model.effects.drivers import Drivers
 from calibrate.model.effects.gravity import point_of
@@ -101,7 +101,7 @@ POSITION = 3  # components of a reading that are lengths
 
 
 @dataclass(frozen=True)
-class HeldOut:
+class HeldOutProof:
     """One split of one instrument; rms over all lengths it reads, wild observations left out of both."""
 
     split: str
@@ -122,9 +122,9 @@ class Floor:
     source: str
 
 
-def proofs(bare: State, full: State, samples: Ints, rng: Generator) -> tuple[HeldOut, ...]:
+def proofs(bare: State, full: State, samples: Ints, rng: Generator) -> tuple[HeldOutProof, ...]:
     """Every split that the session allows, every instrument; states without and with terms, fitted to all samples."""
-    out: list[HeldOut] = []
+    out: list[HeldOutProof] = []
     for split in splits_of(bare.drivers, samples, rng):
         out += _proof(bare, full, samples, split, rng)
     return tuple(out)
@@ -154,9 +154,9 @@ def floors(state: State, samples: Ints, parameters: int) -> tuple[Floor, ...]:
     return tuple(out)
 
 
-def _proof(bare: State, full: State, samples: Ints, split: Split, rng: Generator) -> list[HeldOut]:
-    before: list[Unseen] = []
-    after: list[Unseen] = []
+def _proof(bare: State, full: State, samples: Ints, split: Split, rng: Generator) -> list[HeldOutProof]:
+    before: list[UnseenRows] = []
+    after: list[UnseenRows] = []
     for fold in split.unseen:
         known = np.setdiff1d(samples, fold)
         without = bare.select(known).refitted(()).held_out(fold)
@@ -166,21 +166,21 @@ def _proof(bare: State, full: State, samples: Ints, split: Split, rng: Generator
     return [_compared(split.says, name, before, after, units(bare.drivers), rng) for name in names]
 
 
-def _lengths(unseen: Sequence[Unseen]) -> list[Unseen]:
+def _lengths(unseen: Sequence[UnseenRows]) -> list[UnseenRows]:
     """Without second encoders: angles between two readings of a joint are no error of the arm."""
     return [u for u in unseen if u.instrument != ENCODER_DIFFERENCE]
 
 
 def _compared(
-    split: str, name: str, before: Sequence[Unseen], after: Sequence[Unseen], labels: Ints, rng: Generator
-) -> HeldOut:
+    split: str, name: str, before: Sequence[UnseenRows], after: Sequence[UnseenRows], labels: Ints, rng: Generator
+) -> HeldOutProof:
     mine = [(b, a) for b, a in zip(before, after, strict=True) if b.instrument == name]
     good = np.concatenate([tame(a.whitened, 1.0) for _, a in mine])
     b = np.concatenate([u.misfit[:, :POSITION] for u, _ in mine])[good]
     a = np.concatenate([u.misfit[:, :POSITION] for _, u in mine])[good]
     label = labels[np.concatenate([u.sample for u, _ in mine])[good]]
     squares_b, squares_a = np.sum(b**2, axis=1), np.sum(a**2, axis=1)
-    return HeldOut(
+    return HeldOutProof(
         split, name, len(b), int(np.sum(~good)), _rms(b), _rms(a), _interval(squares_b, squares_a, label, rng)
     )
 

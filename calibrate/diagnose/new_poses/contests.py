@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from calibrate.diagnose import limits
 from calibrate.diagnose.doubts.diagnosis import Diagnosis, Named
 from calibrate.diagnose.doubts.findings import named
-from calibrate.diagnose.doubts.missing_columns import parted_by_time
+from calibrate.diagnose.doubts.missing_columns import separated_by_time
 from calibrate.diagnose.new_poses.longer_session import Elsewhere, NewPoses, elsewhere
 from calibrate.diagnose.new_poses.next_poses import Contest, Duel, next_poses, reach_of
 from calibrate.diagnose.new_poses.reachable import reachable
@@ -96,7 +96,7 @@ def _rivals(state: Fitted, diagnosis: Diagnosis) -> Sequence[tuple[int, Accepted
     for finding in diagnosis.findings:
         at = [i for i, a in enumerate(state.accepted) if named(a.term) == finding.name]
         for rival in finding.rivals if at else ():
-            if parted_by_time(finding.name, rival.name):
+            if separated_by_time(finding.name, rival.name):
                 continue
             found = rival_named(state, at[0], rival.name)
             if found is not None:

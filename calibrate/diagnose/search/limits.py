@@ -31,7 +31,7 @@ BETTER = 0.5  # BIC; an exchange that gains less is not worth it: linear scores 
 MOST_TERMS = 30  # terms; beyond, the form of the model is wrong, not incomplete
 # additions in a row that vanished again, before the search ends: where many effects are mixed up, a third addition has
 # never helped
-IN_VAIN = 2
+VANISHED_IN_A_ROW = 2
 AT_ONCE = 4  # terms better than SURE that are accepted before the next refit
 PEERS = 8  # physics of one port that are tried in turn for a plausible size: ten thermometers are one growth
 LOOKED_AT = 32  # best entries of the catalogue that are tried for one addition

@@ -18,7 +18,7 @@ from scipy.fft import dct
 from scipy.signal import lfilter
 
 from calibrate.diagnose.search import limits
-from calibrate.diagnose.state.linearised import Rows
+from calibrate.diagnose.state.linearised import WhitenedRows
 from calibrate.diagnose.state.visible import Sight
 from calibrate.fit.noise import NU
 
@@ -79,7 +79,7 @@ class Series:
 class NoiseLaw:
     """How to draw noise like that of the session."""
 
-    rows: Rows
+    rows: WhitenedRows
     inflated: Floats  # (row,) residual, leverage corrected
     series: tuple[Series, ...]
 
@@ -149,7 +149,7 @@ def _lengths(square: Floats, shape: tuple[int, ...], rng: Generator) -> Floats:
     return rng.gamma(mean**2 / variance, variance / mean, shape)
 
 
-def curvature_of(rows: Rows) -> float:
+def curvature_of(rows: WhitenedRows) -> float:
     """Of the log likelihood over that of reweighted least squares at the same weights, below one for a t law.
 
     A step of the fit is longer than the least-squares step by its inverse. Hessian of the t law: Lange, Little, Taylor,
@@ -163,7 +163,7 @@ def curvature_of(rows: Rows) -> float:
     return float(np.sum(weight * k * (1.0 - 2.0 * square / (k * (NU + k)))) / np.sum(weight * k))
 
 
-def noise_law(rows: Rows, sight: Sight, t_s: Floats, rng: Generator) -> NoiseLaw:
+def noise_law(rows: WhitenedRows, sight: Sight, t_s: Floats, rng: Generator) -> NoiseLaw:
     """Of a state's rows; `t_s` (sample,) gives the order of capture."""
     leverage = np.minimum(np.sum(sight.basis**2, axis=1), limits.MOST_LEVERAGE)
     inflated = sight.residual / np.sqrt(1.0 - np.where(rows.data, leverage, 0.0))
@@ -171,7 +171,7 @@ def noise_law(rows: Rows, sight: Sight, t_s: Floats, rng: Generator) -> NoiseLaw
     return NoiseLaw(rows, inflated, tuple(found))
 
 
-def capture_orders(rows: Rows, t_s: Floats) -> Sequence[Ints]:
+def capture_orders(rows: WhitenedRows, t_s: Floats) -> Sequence[Ints]:
     """(time, k) row numbers of every instrument with enough observations."""
     out: list[Ints] = []
     for instrument in np.unique(rows.instrument[rows.data]):
@@ -183,7 +183,7 @@ def capture_orders(rows: Rows, t_s: Floats) -> Sequence[Ints]:
     return out
 
 
-def _series(rows: Rows, sight: Sight, t_s: Floats, at: Ints, rng: Generator) -> Series:
+def _series(rows: WhitenedRows, sight: Sight, t_s: Floats, at: Ints, rng: Generator) -> Series:
     n, k = at.shape
     shape = (n, k, PROBES)
     levels = [_left(sight, at, rng.standard_normal(shape))]

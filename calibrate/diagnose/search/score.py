@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from calibrate.diagnose import limits
 from calibrate.diagnose.state.linearised import State
-from calibrate.diagnose.state.visible import Block, Menu, Sight
+from calibrate.diagnose.state.visible import EntryBlock, Menu, Sight
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
@@ -84,7 +84,7 @@ def scores(menu: Menu, without: Removed | None = None) -> Scores:
     return Scores(np.where(rank > 0, gain, -np.inf), rank, squares)
 
 
-def projected(block: Block, sight: Sight, without: Removed | None) -> tuple[Floats, Floats]:
+def projected(block: EntryBlock, sight: Sight, without: Removed | None) -> tuple[Floats, Floats]:
     """Gram matrices (entry, k, k) and products with the residual (entry, k) in the model without some terms."""
     if without is None:
         return block.gram, block.along
@@ -121,7 +121,7 @@ def _explained(gram: Floats, along: Floats, numbers: Floats, rss: float, data: i
     return squares, rank
 
 
-def turned_out(block: Block) -> Floats:
+def turned_out(block: EntryBlock) -> Floats:
     """(entry, k, k) what makes orthonormal rows of every entry's columns behind geometry; zero where nothing shows."""
     w, V = np.linalg.eigh(block.gram)
     turn = V * np.where(w > limits.VISIBLE, 1.0 / np.sqrt(np.maximum(w, limits.VISIBLE)), 0.0)[:, None, :]
@@ -135,7 +135,9 @@ def directions(menu: Menu, entry: int) -> Floats:
     return turn[np.any(turn != 0.0, axis=1)] @ menu.sight.complement(one.raw[0])
 
 
-def _alone(menu: Menu, entry: int) -> Block:
+def _alone(menu: Menu, entry: int) -> EntryBlock:
     block = next(b for b in menu.blocks if entry in b.entries)
     at = np.flatnonzero(block.entries == entry)
-    return Block(block.entries[at], block.size[at], block.raw[at], block.absorbed[at], block.along[at], block.gram[at])
+    return EntryBlock(
+        block.entries[at], block.size[at], block.raw[at], block.absorbed[at], block.along[at], block.gram[at]
+    )

@@ -110,19 +110,19 @@ def settled(at: Search) -> Search:
 def grown_out(at: Search) -> Search:
     """Grown, swapped and pruned until nothing changes."""
     at = tidied(swapped(at))
-    vain: frozenset[Key] = frozenset()  # added, and gone again when the others had found their places
-    in_vain = 0
+    vanished: frozenset[Key] = frozenset()  # added, and gone again when the others had found their places
+    vanished_in_a_row = 0
     for _ in range(limits.MOST_TERMS):
-        open_to = replace(at, banned=at.banned | vain)
+        open_to = replace(at, banned=at.banned | vanished)
         new = grown(open_to) if len(at.state.accepted) < limits.MOST_TERMS else None
-        new = unswallowed(open_to) if new is None else new
+        new = with_untrusted_step(open_to) if new is None else new
         if new is None and (new := merged(at)) is at:
             break
         trial, tried = _at_rest(new)
         if trial.bench.bic < at.bench.bic - limits.BETTER:
-            at, in_vain = trial, 0
-        elif (added := tried - at.keys - vain) and in_vain + 1 < limits.IN_VAIN:
-            vain, in_vain = vain | added, in_vain + 1
+            at, vanished_in_a_row = trial, 0
+        elif (added := tried - at.keys - vanished) and vanished_in_a_row + 1 < limits.VANISHED_IN_A_ROW:
+            vanished, vanished_in_a_row = vanished | added, vanished_in_a_row + 1
         else:
             break
     return at
@@ -134,7 +134,7 @@ def _at_rest(new: Search) -> tuple[Search, frozenset[Key]]:
     return tidied(exchanged), new.keys | exchanged.keys
 
 
-def unswallowed(at: Search) -> Search | None:
+def with_untrusted_step(at: Search) -> Search | None:
     """With the best step for rows that nobody trusts; None if there are few of them, or no step explains them."""
     if at.state.distrusted < FEWEST_AFTER:
         return None

@@ -16,7 +16,7 @@ from calibrate.diagnose import limits
 from calibrate.diagnose.state.assumed import Assumed
 from calibrate.diagnose.state.augmented import Around, Augmented, plain_sizes
 from calibrate.diagnose.state.in_sight import in_sight, solve_in_sight
-from calibrate.diagnose.state.linearised import Rows, Unseen
+from calibrate.diagnose.state.linearised import UnseenRows, WhitenedRows
 from calibrate.diagnose.state.noise_of_fit import (
     Noise,
     covariance_at,
@@ -137,11 +137,11 @@ class Fitted:
         return kept if kept is not None and kept.drivers is self.drivers else Listed(self.drivers)
 
     @property
-    def rows(self) -> Rows:
+    def rows(self) -> WhitenedRows:
         return self._rows
 
     @cached_property
-    def _rows(self) -> Rows:
+    def _rows(self) -> WhitenedRows:
         parameters = self.problem.parameters
         free = np.flatnonzero([p.free for p in parameters])
         believed = free[np.isfinite(priors(parameters)[free])]
@@ -158,7 +158,9 @@ class Fitted:
         none = np.full(known + len(believed), -1, dtype=np.intp)
         labels = [np.concatenate([x, none]) for x in self._labels]
         stated = len(self._labels[0]) + blocks + np.arange(assumed)
-        return Rows(residual, np.concatenate([slope, beliefs]), *labels, owner=self.problem.owner[free], stated=stated)
+        return WhitenedRows(
+            residual, np.concatenate([slope, beliefs]), *labels, owner=self.problem.owner[free], stated=stated
+        )
 
     @cached_property
     def _labels(self) -> tuple[Ints, Ints, Ints]:
@@ -256,18 +258,18 @@ class Fitted:
     def select(self, samples: Ints) -> "Fitted":
         return _cut(self, np.sort(samples))
 
-    def held_out(self, samples: Ints) -> tuple[Unseen, ...]:
+    def held_out(self, samples: Ints) -> tuple[UnseenRows, ...]:
         rows = _rows_of(self.session, np.sort(samples))
         moved = places_found(self.problem, self.values, self.scatters, rows, len(self._labels[0]))
         at = self.problem.around(moved)
         misfits = [m.problem.observed - e for m, e in zip(self.session.measured, at.expected, strict=True)]
         apart = misfits if self.noise.shared is None else self.noise.shared.apart(misfits)
-        out: list[Unseen] = []
+        out: list[UnseenRows] = []
         for i, (m, r) in enumerate(zip(self.session.measured, rows, strict=True)):
             if len(r) == 0 or len(self.problem.rows[i]) == 0:  # without a row in the fit its noise is unknown
                 continue
             W = whitener_of(covariance_at(self.scatters[i], self.problem.rows[i], r))
-            out.append(Unseen(m.name, m.sample_rows[r, -1], misfits[i][r], np.einsum("nij,nj->ni", W, apart[i][r])))
+            out.append(UnseenRows(m.name, m.sample_rows[r, -1], misfits[i][r], np.einsum("nij,nj->ni", W, apart[i][r])))
         return tuple(out)
 
     def _refitted(self, accepted: tuple[Accepted, ...], noise: Noise) -> "Fitted":

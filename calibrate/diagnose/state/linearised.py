@@ -20,7 +20,7 @@ Ints = NDArray[np.intp]
 
 
 @dataclass(frozen=True)
-class Rows:
+class WhitenedRows:
     """Whitened rows: first those of the data, then one for every prior. Unit noise where the model holds."""
 
     residual: Floats  # (row,) observed minus expected, robust weights included
@@ -37,7 +37,7 @@ class Rows:
 
 
 @dataclass(frozen=True)
-class Unseen:
+class UnseenRows:
     """One instrument's observations that the fit has not seen."""
 
     instrument: str
@@ -62,7 +62,7 @@ class State(Protocol):
     def accepted(self) -> tuple[Accepted, ...]: ...
 
     @property
-    def rows(self) -> Rows:
+    def rows(self) -> WhitenedRows:
         """Linearised at this state; `geometry` holds geometry and the coefficients and inner values of `accepted`."""
         ...
 
@@ -110,7 +110,7 @@ class State(Protocol):
         """The same model over some of the samples, not refitted."""
         ...
 
-    def held_out(self, samples: Ints) -> tuple["Unseen", ...]:
+    def held_out(self, samples: Ints) -> tuple["UnseenRows", ...]:
         """What this state, fitted on other samples, predicts of these. Where a place or seat occurs in these samples
         only, its own frame or point is found from them first, everything else being held.
         """

@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 
 from calibrate.diagnose.streams import limits
 from calibrate.diagnose.streams.coarse_clock import Ticks, coarse
-from calibrate.diagnose.streams.track import SIGMA_OF_MEDIAN, Curve, Track, white_noise
+from calibrate.diagnose.streams.track import SIGMA_OF_MEDIAN, Track, TrackCurve, white_noise
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
@@ -38,7 +38,7 @@ SINGULAR = 1e-10  # of the scaled normal matrix: below, a combination is not see
 
 
 @dataclass(frozen=True)
-class Line:
+class RobustLine:
     """Solution of a linear fit; `covariance` NaN where the data do not determine it."""
 
     values: Floats
@@ -50,7 +50,7 @@ class Line:
         return np.sqrt(np.diag(self.covariance))
 
 
-def fit(X: Floats, y: Floats, block: Ints, rounds: int = 4) -> Line | None:
+def fit(X: Floats, y: Floats, block: Ints, rounds: int = 4) -> RobustLine | None:
     """Robust y = X b. `X` (row, k), `y` (row,), `block` (row,). None where X is singular or blocks are too few."""
     k, blocks = X.shape[1], len(np.unique(block))
     scale = np.linalg.norm(X, axis=0)
@@ -73,7 +73,7 @@ def fit(X: Floats, y: Floats, block: Ints, rounds: int = 4) -> Line | None:
         b = np.linalg.solve(normal, Z.T @ (weight * y))
     residual = y - Z @ b
     covariance = _jackknife(Z, weight * residual, holds, block) / np.outer(scale, scale)
-    return Line(b / scale, covariance, blocks)
+    return RobustLine(b / scale, covariance, blocks)
 
 
 def _middle(values: Floats, weight: Floats) -> float:
@@ -168,7 +168,7 @@ def _noise(reference: Track, other: Track) -> Floats:
 
 
 def _rows(
-    curve: Curve, other: Track, noise: Floats, middle_s: float, found: Floats
+    curve: TrackCurve, other: Track, noise: Floats, middle_s: float, found: Floats
 ) -> tuple[Floats, Floats, Ints] | None:
     """Columns of offset and drift, residual, block, in sigmas; level and gain of every block and channel taken out."""
     since_s = other.time_s - middle_s

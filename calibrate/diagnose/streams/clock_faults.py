@@ -16,12 +16,12 @@ from scipy.stats import norm
 from calibrate.diagnose.streams import limits
 from calibrate.diagnose.streams.clock import ClockFit
 from calibrate.diagnose.streams.continuity import Break, Fault
-from calibrate.diagnose.streams.recorded import Device, stamps_scatter_s, start_between
+from calibrate.diagnose.streams.recorded import StreamDevice, stamps_scatter_s, start_between
 
 Floats = NDArray[np.float64]
 
 
-def judged(device: Device, faults: tuple[Break, ...]) -> tuple[tuple[Break, ...], Device]:
+def judged(device: StreamDevice, faults: tuple[Break, ...]) -> tuple[tuple[Break, ...], StreamDevice]:
     """Jumps of time as what they are, and the device with its clock's steps taken out."""
     usual_s = device.track.period_s
     time_s, out = device.track.time_s.copy(), list[Break]()
@@ -41,20 +41,20 @@ def judged(device: Device, faults: tuple[Break, ...]) -> tuple[tuple[Break, ...]
     return tuple(out), replace(device, track=replace(device.track, time_s=time_s))
 
 
-def stamped_by_host(device: Device) -> bool:
+def stamped_by_host(device: StreamDevice) -> bool:
     """Whether the device has no clock of its own, and carries the host's stamps for it."""
     apart = np.diff(device.track.time_s) - np.diff(device.host_s)
     return len(apart) > 0 and float(np.max(np.abs(apart))) < 1e-6
 
 
-def shares_host_clock(device: Device) -> bool:
+def shares_host_clock(device: StreamDevice) -> bool:
     """Whether its stamps count on the host's clock, such as those of a bus adapter without one of its own."""
     return (
         len(device.host_s) > 0 and float(np.median(np.abs(device.track.time_s - device.host_s))) < limits.SHARED_CLOCK_S
     )
 
 
-def _denied_s(device: Device, at: int) -> float:
+def _denied_s(device: StreamDevice, at: int) -> float:
     """How far the device's clock ran ahead of the host's there."""
     t, host = device.track.time_s, device.host_s
     span_s, host_span_s = float(np.ptp(t)), float(np.ptp(host))
@@ -96,7 +96,7 @@ class Late:
         return max(limits.LATE_SIGMAS * self.drift_sigma, limits.CLOCK_DRIFT) < abs(self.drift) < limits.OTHER_PACE
 
 
-def lateness(joints: Device, other: Device, fit: ClockFit) -> Late | None:
+def lateness(joints: StreamDevice, other: StreamDevice, fit: ClockFit) -> Late | None:
     """None where clocks or stamps show nothing."""
     other = replace(other, host_s=other.track.time_s) if shares_host_clock(other) else other
     start = start_between(joints, other)

@@ -12,19 +12,19 @@ from calibrate.diagnose.streams.clock_faults import judged, lateness, shares_hos
 from calibrate.diagnose.streams.coarse_clock import Ticks
 from calibrate.diagnose.streams.continuity import Fault, breaks
 from calibrate.diagnose.streams.following import Following, following
-from calibrate.diagnose.streams.recorded import Device, by_host, start_between
+from calibrate.diagnose.streams.recorded import StreamDevice, by_host, start_between
 from calibrate.diagnose.streams.ringing import Levers, ringing
 from calibrate.diagnose.streams.settling import Stand, Window, stands_of, unsettled
 from calibrate.diagnose.streams.slips import Causes, slips
 from calibrate.diagnose.streams.stream_findings import (
     StreamFinding,
-    told_breaks,
-    told_following,
-    told_late,
-    told_reading_lag,
-    told_ringing,
-    told_slip,
-    told_unsettled,
+    break_findings,
+    following_finding,
+    late_finding,
+    reading_lag_finding,
+    ringing_finding,
+    slip_finding,
+    unsettled_finding,
 )
 from calibrate.diagnose.streams.track import SIGMA_OF_MEDIAN, Outcome, Track
 
@@ -46,7 +46,7 @@ class StreamReport:
 
 
 def examine(
-    devices: Mapping[str, Device],
+    devices: Mapping[str, StreamDevice],
     predicted: Predicted | None = None,
     windows: Sequence[Window] | None = None,
     causes: Causes | None = None,
@@ -65,7 +65,7 @@ def examine(
     behind: tuple[Following, ...] = ()
     if command is not None:
         behind = following(command.track, joints.track)
-        found += [told_following(one) for one in behind if one.outcome is Outcome.FOUND]
+        found += [following_finding(one) for one in behind if one.outcome is Outcome.FOUND]
     if "encoders" in devices:
         clocks["encoders"], more = _encoders(joints, devices["encoders"], stands, causes)
         found += more
@@ -77,13 +77,13 @@ def examine(
     for name, fit in clocks.items():
         late = lateness(joints, devices[name], fit)
         if late is not None and late.counts:
-            found.append(told_late(name, late, joints.track.channels))
+            found.append(late_finding(name, late, joints.track.channels))
     found += _rings(joints.track, stands)
     return StreamReport(tuple(found), clocks, behind, stands, tuple(_unseen(devices, clocks, behind, windows)))
 
 
 def _unseen(
-    devices: Mapping[str, Device],
+    devices: Mapping[str, StreamDevice],
     clocks: Mapping[str, ClockFit],
     behind: Sequence[Following],
     windows: Sequence[Window] | None,
@@ -98,23 +98,23 @@ def _unseen(
     yield from (f"following error of joint {f.joint}: it hardly moves" for f in behind if f.behind_s is None)
 
 
-def _mended(devices: Mapping[str, Device]) -> tuple[list[StreamFinding], dict[str, Device]]:
+def _mended(devices: Mapping[str, StreamDevice]) -> tuple[list[StreamFinding], dict[str, StreamDevice]]:
     """What is broken in each stream, and the streams with steps of their clocks taken out.
 
     Joints share the clock of their set-point; spots are never without noise; encoders are judged once aligned.
     """
     found: list[StreamFinding] = []
-    out: dict[str, Device] = {}
+    out: dict[str, StreamDevice] = {}
     for name, device in devices.items():
         moving = devices["command"].track if name == "joints" and "command" in devices else None
         faults = breaks(device.track, device.sequence, moving, noisy=name == "spots")
         told, out[name] = judged(device, faults)
-        found += told_breaks(device.track, told)
+        found += break_findings(device.track, told)
     return found, out
 
 
 def _encoders(
-    joints: Device, encoders: Device, stands: tuple[Stand, ...], causes: Causes | None
+    joints: StreamDevice, encoders: StreamDevice, stands: tuple[Stand, ...], causes: Causes | None
 ) -> tuple[ClockFit, list[StreamFinding]]:
     fit = clock_between(joints.track, encoders.track, start_between(joints, encoders))
     if fit.offset_s is None:
@@ -127,10 +127,10 @@ def _encoders(
         fit = fit if again.offset_s is None else again
         lags = following(joints.track, _moved(encoders.track, fit))
     at_joints = _moved(encoders.track, fit)
-    found = [told_reading_lag(one) for one in lags if one.outcome is Outcome.FOUND]
-    found += [told_slip(one) for one in slips(at_joints, joints.track, stands, causes).found]
+    found = [reading_lag_finding(one) for one in lags if one.outcome is Outcome.FOUND]
+    found += [slip_finding(one) for one in slips(at_joints, joints.track, stands, causes).found]
     frozen = [one for one in breaks(at_joints, None, _behind(joints.track, lags)) if one.fault is Fault.FROZEN]
-    return fit, found + told_breaks(at_joints, frozen) + _rings(at_joints, stands)
+    return fit, found + break_findings(at_joints, frozen) + _rings(at_joints, stands)
 
 
 def _behind(track: Track, lags: Sequence[Following]) -> Track:
@@ -144,7 +144,7 @@ def _behind(track: Track, lags: Sequence[Following]) -> Track:
 
 
 def _by_stamps(
-    joints: Device, encoders: Device, stands: tuple[Stand, ...], causes: Causes | None
+    joints: StreamDevice, encoders: StreamDevice, stands: tuple[Stand, ...], causes: Causes | None
 ) -> tuple[ClockFit, list[StreamFinding]]:
     """A host that runs at no even pace beside the joints leads to their clock piece by piece, to some milliseconds.
 
@@ -155,7 +155,7 @@ def _by_stamps(
     fit = clock_between(joints.track, track, Ticks(0.0))
     if fit.offset_s is None:
         return fit, []
-    found = [told_slip(one) for one in slips(_moved(track, fit), joints.track, stands, causes).found]
+    found = [slip_finding(one) for one in slips(_moved(track, fit), joints.track, stands, causes).found]
     return ClockFit(ClockStatus.UNEVEN), found
 
 
@@ -182,7 +182,7 @@ class _Spots:
     findings: list[StreamFinding]
 
 
-def _spots(joints: Device, spots: Device, stands: tuple[Stand, ...], predicted: Predicted | None) -> _Spots:
+def _spots(joints: StreamDevice, spots: StreamDevice, stands: tuple[Stand, ...], predicted: Predicted | None) -> _Spots:
     by_stamps = replace(spots.track, time_s=by_host(spots.track.time_s, spots, joints))
     if predicted is None:
         return _Spots(by_stamps, None, [])
@@ -191,11 +191,11 @@ def _spots(joints: Device, spots: Device, stands: tuple[Stand, ...], predicted: 
     fit = clock_between(model, spots.track, start_between(joints, spots))
     at_joints = _moved(spots.track, fit) if fit.offset_s is not None else by_stamps
     rings = ringing(at_joints, stands, levers_of(track, predicted), limits.SERVO_S)
-    return _Spots(at_joints, fit, [told_ringing(at_joints, rings)] if rings.stops else [])
+    return _Spots(at_joints, fit, [ringing_finding(at_joints, rings)] if rings.stops else [])
 
 
 def _unsettled(
-    spots: Device, seen: _Spots, windows: Sequence[Window] | None, stands: tuple[Stand, ...], joints: int
+    spots: StreamDevice, seen: _Spots, windows: Sequence[Window] | None, stands: tuple[Stand, ...], joints: int
 ) -> list[StreamFinding]:
     """Windows move with the spots, so the samples in them stay the same whatever the clocks."""
     if not windows:
@@ -208,7 +208,7 @@ def _unsettled(
     each = unsettled(seen.track, moved, stands)
     if not any(one.outcome is Outcome.FOUND for one in each):
         return []
-    return [told_unsettled(seen.track, moved, each, joints)]
+    return [unsettled_finding(seen.track, moved, each, joints)]
 
 
 def levers_of(joints: Track, predicted: Predicted) -> Levers:
@@ -232,4 +232,4 @@ def _moved(track: Track, fit: ClockFit) -> Track:
 def _rings(track: Track, stands: tuple[Stand, ...]) -> list[StreamFinding]:
     """Of angles: every joint turns its own reading only."""
     rings = ringing(track, stands, lambda _: np.eye(track.channels), limits.SERVO_S)
-    return [told_ringing(track, rings)] if rings.stops else []
+    return [ringing_finding(track, rings)] if rings.stops else []

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.stats import norm
 
 from calibrate.diagnose.streams import limits
-from calibrate.diagnose.streams.clock import Line, fit
+from calibrate.diagnose.streams.clock import RobustLine, fit
 from calibrate.diagnose.streams.track import Outcome, Track
 
 Floats = NDArray[np.float64]
@@ -78,7 +78,7 @@ def _joint(joint: int, error: Floats, v: Floats, a: Floats, block: NDArray[np.in
     )
 
 
-def _kind(line: Line) -> str:
+def _kind(line: RobustLine) -> str:
     """By what acceleration adds, where its sigma separates the two."""
     behind_s, by_a = float(line.values[0]), float(line.values[1])
     sigma = float(line.sigma[1])

@@ -20,7 +20,7 @@ COMMAND, JOINTS, ENCODERS, CURRENTS = "target_q_rad", "actual_q_rad", "position_
 
 
 @dataclass(frozen=True, eq=False)
-class Device:
+class StreamDevice:
     """A track with its device's counter and the host's stamps."""
 
     track: Track
@@ -28,7 +28,7 @@ class Device:
     host_s: Floats
 
 
-def devices_of(recording: Recording) -> Mapping[str, Device]:
+def devices_of(recording: Recording) -> Mapping[str, StreamDevice]:
     """Those that the recording has of "command", "joints", "encoders", "spots"."""
     found = {
         "command": _of(recording, COMMAND, "command"),
@@ -39,7 +39,7 @@ def devices_of(recording: Recording) -> Mapping[str, Device]:
     return {name: device for name, device in found.items() if device is not None}
 
 
-def start_between(reference: Device, other: Device) -> Ticks | None:
+def start_between(reference: StreamDevice, other: StreamDevice) -> Ticks | None:
     """From the host's stamps: each device's promptest ones, which were delayed least. None where they show nothing."""
     one, two = _host_line(reference), _host_line(other)
     if one is None or two is None:
@@ -50,7 +50,7 @@ def start_between(reference: Device, other: Device) -> Ticks | None:
     return Ticks((host_s - one[0]) / one[1] - at_s, rate - 1.0, at_s)
 
 
-def stamps_scatter_s(device: Device) -> float:
+def stamps_scatter_s(device: StreamDevice) -> float:
     """How well the host's stamps give the device's time, in its seconds: scatter of the promptest about their line.
 
     Infinite without a line.
@@ -66,16 +66,16 @@ def _stream(recording: Recording, channel: str) -> Stream | None:
     return next((s for s in recording.streams.values() if channel in s.values and len(s.host_s)), None)
 
 
-def _of(recording: Recording, channel: str, name: str) -> Device | None:
+def _of(recording: Recording, channel: str, name: str) -> StreamDevice | None:
     stream = _stream(recording, channel)
     if stream is None:
         return None
     values = np.asarray(stream.values[channel], dtype=float)
     values = values.reshape(len(values), math.prod(values.shape[1:]))  # also of a stream without a sample
-    return Device(Track(name, "rad", stream.device_s, values), stream.sequence, stream.host_s)
+    return StreamDevice(Track(name, "rad", stream.device_s, values), stream.sequence, stream.host_s)
 
 
-def _spots(recording: Recording) -> Device | None:
+def _spots(recording: Recording) -> StreamDevice | None:
     """Of every photocurrent, by the duo-lateral formula (On-Trak Photonics, "PSD theory"); NaN unless both are lit."""
     stream, fixture = _stream(recording, CURRENTS), recording.rig.fixture
     if stream is None or fixture is None:
@@ -87,10 +87,10 @@ def _spots(recording: Recording) -> Device | None:
     usual = np.nanpercentile(total, 90.0, axis=0)
     dark = np.any(~(total > limits.DARK * usual), axis=(1, 2))
     values = np.where(dark[:, None], np.nan, spot.reshape(-1, 4))
-    return Device(Track("spots", "m", stream.device_s, values), stream.sequence, stream.host_s)
+    return StreamDevice(Track("spots", "m", stream.device_s, values), stream.sequence, stream.host_s)
 
 
-def _host_line(device: Device) -> tuple[float, float] | None:
+def _host_line(device: StreamDevice) -> tuple[float, float] | None:
     """Level and rate of host = level + rate device, through the least delayed stamps."""
     prompt = _prompt(device)
     if len(prompt) < limits.PROMPT_WINDOWS // 2:
@@ -99,7 +99,7 @@ def _host_line(device: Device) -> tuple[float, float] | None:
     return (level, rate) if rate > 0.0 else None
 
 
-def _prompt(device: Device) -> list[int]:
+def _prompt(device: StreamDevice) -> list[int]:
     """The sample of each window that came least late."""
     t, host = device.track.time_s, device.host_s
     if len(t) < 4 * limits.PROMPT_WINDOWS or not np.ptp(t) > 0.0 or not np.ptp(host) > 0.0:
@@ -110,7 +110,7 @@ def _prompt(device: Device) -> list[int]:
     return [int(rows[np.argmin(late[rows])]) for rows in at if len(rows)]
 
 
-def by_host(time_s: Floats, own: Device, other: Device) -> Floats:
+def by_host(time_s: Floats, own: StreamDevice, other: StreamDevice) -> Floats:
     """Times of `own` on the clock of `other`, by the host's stamps of both: good to what the lines delay."""
     host_s = np.interp(time_s, own.track.time_s, np.maximum.accumulate(own.host_s))
     return np.interp(host_s, np.maximum.accumulate(other.host_s), other.track.time_s)

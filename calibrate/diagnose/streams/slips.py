@@ -23,7 +23,7 @@ from calibrate.diagnose.search.null import is_slow
 from calibrate.diagnose.state.fitted import Fitted
 from calibrate.diagnose.streams import limits
 from calibrate.diagnose.streams.settling import Stand
-from calibrate.diagnose.streams.track import Curve, Track
+from calibrate.diagnose.streams.track import Track, TrackCurve
 from calibrate.model.effects.drivers import MOVED_RAD
 from calibrate.model.effects.gravity import likely_torque_nm
 from calibrate.model.effects.ports import Perturbation
@@ -78,7 +78,7 @@ def slips(track: Track, other: Track, stands: Sequence[Stand], causes: Causes | 
     return Slips(tuple(sorted(found, key=lambda slip: slip.from_s)), tuple(judged))
 
 
-def _pieces(difference: Track, at: Curve, stands: Sequence[Stand], j: int) -> Floats:
+def _pieces(difference: Track, at: TrackCurve, stands: Sequence[Stand], j: int) -> Floats:
     """(stand, 5 + joint): begin, end, mean difference, angle, side that the joint came from, angles of all joints.
 
     A stand with a jump in it gives two.

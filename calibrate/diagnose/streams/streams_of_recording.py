@@ -30,7 +30,7 @@ from calibrate.diagnose.record.schema import (
 from calibrate.diagnose.state.fitted import Fitted
 from calibrate.diagnose.streams.clock import ClockFit
 from calibrate.diagnose.streams.examine import Predicted, StreamReport, examine
-from calibrate.diagnose.streams.recorded import Device, by_host, devices_of
+from calibrate.diagnose.streams.recorded import StreamDevice, by_host, devices_of
 from calibrate.diagnose.streams.settling import Window
 from calibrate.diagnose.streams.slips import causes_of
 from calibrate.diagnose.streams.stream_findings import StreamFinding
@@ -43,7 +43,7 @@ EVENT = "sample"  # one a sample, in their order, with `psd_from_s` and `psd_to_
 
 
 @dataclass(frozen=True, eq=False)
-class Around:
+class AroundSamples:
     """Where the fixture stood and which face came first, by the samples before and after a time."""
 
     time_s: Floats  # (sample,) rising
@@ -69,7 +69,9 @@ def sample_windows(recording: Recording) -> tuple[Window, ...] | None:
         return None
 
 
-def around(recording: Recording, windows: tuple[Window, ...] | None, spots: Device, joints: Device) -> Around | None:
+def around(
+    recording: Recording, windows: tuple[Window, ...] | None, spots: StreamDevice, joints: StreamDevice
+) -> AroundSamples | None:
     """On the clock of the joints; None where no sample states where the fixture stood.
 
     Without windows `t_s` counts from `host_s0`, as docs/formats.md has it.
@@ -84,7 +86,7 @@ def around(recording: Recording, windows: tuple[Window, ...] | None, spots: Devi
         time_s = by_host(np.array([0.5 * (w.from_s + w.to_s) for w in windows]), spots, joints)
     order = np.argsort(time_s, kind="stable")
     placement, first = samples.integers("placement", 0), samples.integers("first_psd", 0)
-    return Around(time_s[order], placement[order], first[order])
+    return AroundSamples(time_s[order], placement[order], first[order])
 
 
 ORDERS = (1, 2)
@@ -102,7 +104,7 @@ def streams_of(recording: Recording, fitted: Fitted | None) -> StreamReport | No
     return examine(devices, predicted, windows, None if fitted is None else causes_of(fitted))
 
 
-def predicted_spots(fitted: Fitted, around: Around) -> Predicted | None:
+def predicted_spots(fitted: Fitted, around: AroundSamples) -> Predicted | None:
     """NaN where the beam misses a face, or it is unknown where the fixture stood. None without a dual PSD."""
     rig = fitted.session.rig
     if rig.fixture is None or not rig.placements:

@@ -59,9 +59,9 @@ class Track:
         return self.take(np.flatnonzero(good)[first])
 
     @cached_property
-    def curve(self) -> "Curve":
+    def curve(self) -> "TrackCurve":
         """Between its samples; made once."""
-        return Curve(self)
+        return TrackCurve(self)
 
     def take(self, rows: Bools | Ints | slice) -> "Track":
         return replace(self, time_s=self.time_s[rows], values=self.values[rows])
@@ -71,7 +71,7 @@ class Track:
         return self.take((self.time_s >= from_s) & (self.time_s <= to_s))
 
 
-class Curve:
+class TrackCurve:
     """A track between its samples: cubic splines, NaN in gaps and outside. `rate`: its slope, (time, channel)."""
 
     def __init__(self, track: Track) -> None:
