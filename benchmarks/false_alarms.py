@@ -14,7 +14,7 @@ from scipy.stats import beta
 
 from acquisition.recording.session_folder import read_folder
 from calibrate.diagnose.doubts.diagnosis import Verdict
-from calibrate.diagnose.doubts.doubt import Doubted, doubted
+from calibrate.diagnose.doubts.doubt import Assessed, assessed
 from calibrate.diagnose.state.fitted import fit_geometry
 from calibrate.diagnose.state.session import session_of
 from calibrate.model.effects.catalogue import missing_of
@@ -38,7 +38,7 @@ class Alarms:
     sessions: int
     named: int  # physics with a name
     unnamed: int  # a curve of unknown cause only
-    doubted: int  # "undecidable", nothing found
+    assessed: int  # "undecidable", nothing found
 
     @property
     def rate(self) -> float:
@@ -62,7 +62,7 @@ def run(noise: Kind, sessions: int = SESSIONS, first_seed: int = FIRST_SEED) -> 
     return Alarms(noise, len(found), named, anything - named, unsure)
 
 
-def _diagnosed(noise: Kind, sessions: int, first_seed: int) -> Iterator[Doubted | None]:
+def _diagnosed(noise: Kind, sessions: int, first_seed: int) -> Iterator[Assessed | None]:
     """None: the seed gives no session."""
     for number in range(sessions):
         family, places = DRAWN[number % len(DRAWN)]
@@ -72,7 +72,7 @@ def _diagnosed(noise: Kind, sessions: int, first_seed: int) -> Iterator[Doubted 
         yield _session(wanted)
 
 
-def _session(wanted: Wanted) -> Doubted | None:
+def _session(wanted: Wanted) -> Assessed | None:
     try:
         case = conceal(wanted)
     except ConcealError:
@@ -81,7 +81,7 @@ def _session(wanted: Wanted) -> Doubted | None:
         write_case(case, Path(folder))
         recording = read_folder(Path(folder) / "recording")
     geometry = fit_geometry(session_of(recording.rig, recording.samples))
-    return doubted(geometry, np.random.default_rng(wanted.seed), missing_of(geometry.drivers))
+    return assessed(geometry, np.random.default_rng(wanted.seed), missing_of(geometry.drivers))
 
 
 def lines(sessions: int = SESSIONS, first_seed: int = FIRST_SEED) -> Iterator[str]:

@@ -19,7 +19,7 @@ from calibeam.prove.unseen import read_asked, tool_at
 from calibrate.diagnose.doubts.findings import (
     named,
 )
-from calibrate.diagnose.doubts.folds import (
+from calibrate.diagnose.doubts.unseen_rows import (
     splits_of,
 )
 from calibrate.diagnose.record.file import (
@@ -44,7 +44,7 @@ from calibrate.diagnose.state.fitted import (
 )
 from calibrate.diagnose.state.linearised import (
     Accepted,
-    Unseen,
+    UnseenRows,
 )
 from calibrate.diagnose.state.session import (
     session_of,
@@ -139,7 +139,7 @@ def _is_said(term: Term, finding: FindingRecord) -> bool:
     return (name.where, ",".join(name.depends_on), name.shape, name.order, name.physics) == said
 
 
-def misfit_m(unseen: Sequence[Unseen], wild: NDArray[np.bool_] | None = None) -> Floats:
+def misfit_m(unseen: Sequence[UnseenRows], wild: NDArray[np.bool_] | None = None) -> Floats:
     """(reading,) lengths that a model misses on unseen samples, wild ones left out."""
     lengths = [u.misfit for u in unseen if u.instrument != ENCODER_DIFFERENCE]
     parts = [misfit[:, :LENGTHS] if misfit.shape[1] > 4 else misfit for misfit in lengths]
@@ -208,12 +208,12 @@ class _Rest:
     """What everybody is measured by."""
 
     fold: Fold
-    plain: tuple[Unseen, ...]  # misses of geometry alone
+    plain: tuple[UnseenRows, ...]  # misses of geometry alone
     wild: NDArray[np.bool_]
     before_m: float
     oracle_m: float
 
-    def score(self, method: str, left: Sequence[Unseen], says: str) -> BaselineScore:
+    def score(self, method: str, left: Sequence[UnseenRows], says: str) -> BaselineScore:
         rms = rms_m(misfit_m(left, self.wild))
         return BaselineScore(method, rms, _gain(rms, self.before_m, self.oracle_m), says)
 
@@ -230,13 +230,13 @@ def _diagnosed(state: Fitted, file: DiagnosisFile, rest: _Rest) -> list[Baseline
 def _rival(method: Method, rest: _Rest) -> BaselineScore:
     """Each instrument learnt by itself, in sigmas of its own."""
     X, names = features(rest.fold.geometry)
-    left: list[Unseen] = []
+    left: list[UnseenRows] = []
     says = ""
     for seen, unseen in zip(rest.fold.geometry.held_out(rest.fold.train), rest.plain, strict=True):
         scale = sigma_about_zero(seen.misfit, axis=0)
         learnt = method.learn(X[seen.sample], _tame(seen.misfit / scale), X[unseen.sample], names)
         missed = unseen.misfit - learnt.predicted * scale
-        left.append(Unseen(unseen.instrument, unseen.sample, missed, unseen.whitened))
+        left.append(UnseenRows(unseen.instrument, unseen.sample, missed, unseen.whitened))
         says = says or learnt.says
     return rest.score(method.name, left, says)
 

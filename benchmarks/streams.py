@@ -10,13 +10,11 @@ from numpy.typing import NDArray
 from benchmarks.stream_cases import Scene, Scenes, drawn_clock, servo_scene, sway_rad, world_scene
 from calibrate.diagnose.streams.clock import clock_between
 from calibrate.diagnose.streams.continuity import Fault, breaks
-from calibrate.diagnose.streams.finding import Outcome
 from calibrate.diagnose.streams.following import following
 from calibrate.diagnose.streams.ringing import ringing
-from calibrate.diagnose.streams.settling import Window, unsettled
+from calibrate.diagnose.streams.settling import Window, stands_of, unsettled
 from calibrate.diagnose.streams.slips import slips
-from calibrate.diagnose.streams.stands import stands_of
-from calibrate.diagnose.streams.track import Track
+from calibrate.diagnose.streams.track import Outcome, Track
 
 Floats = NDArray[np.float64]
 

@@ -40,7 +40,8 @@ from calibrate.compare.reconciled_rows import (
     what_remains,
     what_was_left_out,
 )
-from calibrate.diagnose.from_recording import FEWEST, Diagnosed
+from calibrate.diagnose import limits
+from calibrate.diagnose.from_recording import Diagnosed
 from calibrate.diagnose.record.schema import DiagnosisFile
 from calibrate.diagnose.state import session_of
 from calibrate.diagnose.with_model import model_of_diagnosis, model_of_fit
@@ -133,7 +134,7 @@ def _of_few(
 ) -> Reconciled:
     """What all rows show without a diagnosis: how far apart the two are, and whether noise alone may do it."""
     beyond = [one for one in found if one.stated_m is not None and one.low_m > AGREES * one.stated_m]
-    poses, needed = int(poses_of(measured.samples).max()) + 1, round(FEWEST / (1.0 - UNSEEN))
+    poses, needed = int(poses_of(measured.samples).max()) + 1, round(limits.FEWEST_SAMPLES / (1.0 - UNSEEN))
     rows = f"{counted(len(measured.samples), 'row')} in {counted(poses, 'pose')}"
     open_ = f"{rows}: what the simulation lacks cannot be decided; about {needed} poses are needed"
     far = "; ".join(

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from acquisition.recording import Recording, Samples
 from acquisition.recording.samples import BAR, BAR_END, SEAT, cells_of, per_joint
 from calibrate.apply.predicting import predict_with_physics
-from calibrate.compare.seated import is_seated
+from calibrate.compare.matched import is_seated
 from calibrate.errors import DataError
 from calibrate.model.model_file import ModelFile
 from calibrate.model.predict import Predictor

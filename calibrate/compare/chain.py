@@ -3,7 +3,7 @@
 A link's own difference is what is left when everything in front of it is taken out: joints less set-points, encoders
 less joints, readings less what the model states the joints' difference does to them. So the first link that differs is
 where the two part, and those behind it do not repeat it. Of a probe in a cone or at a bar the joints are the reading:
-such rows are compared in calibrate/compare/seated.py.
+such rows are compared in calibrate/compare/matched.py.
 """
 
 from collections.abc import Callable, Mapping
@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation
 from acquisition.recording import Samples
 from acquisition.recording.rig import Rig
 from acquisition.recording.samples import ORIENTATION, POSITION, SPOTS, per_joint
-from calibrate.compare.seated import (
+from calibrate.compare.matched import (
     LENGTH,
     bar_differences,
     is_seated,

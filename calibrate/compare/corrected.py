@@ -18,7 +18,7 @@ from acquisition.recording import Samples
 from acquisition.recording.rig import Rig
 from acquisition.recording.samples import ORIENTATION, POSITION, SPOTS, per_joint
 from calibrate.compare.chain import Pair, columns_of
-from calibrate.compare.seated import is_seated
+from calibrate.compare.matched import is_seated
 from calibrate.diagnose.state import EffectProblem, Fitted, Session, noise_of, session_of
 from calibrate.errors import DataError
 from calibrate.fit.identify.session import about_of, assumed_sigma

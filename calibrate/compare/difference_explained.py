@@ -24,8 +24,8 @@ from calibrate.compare.corrected import compared_session, corrected_samples, sim
 from calibrate.compare.link_differs import (
     ALARM,
     ROUNDING,
+    chance_of_structure,
 )
-from calibrate.compare.own_noise import chance_of_structure
 from calibrate.diagnose.record.schema import DiagnosisFile
 from calibrate.diagnose.record.to_file import file_of
 from calibrate.diagnose.state import Fitted

@@ -16,10 +16,14 @@ from acquisition.recording.samples import ORIENTATION, POSITION, SPOTS, WIRE
 from calibrate.compare.beside_simulation import device_between
 from calibrate.compare.comparison_file import ComparisonFile
 from calibrate.compare.corrected import simulated_of
-from calibrate.compare.seated import is_seated
+from calibrate.compare.matched import (
+    is_seated,
+)
 from calibrate.diagnose.doubts import Verdict
-from calibrate.diagnose.from_recording import FEWEST
 from calibrate.diagnose.record.schema import DiagnosisFile
+from calibrate.diagnose.streams.track import (
+    FEWEST,
+)
 from calibrate.errors import DataError
 from calibrate.model.sensors import (
     full_pose,

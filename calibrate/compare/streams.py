@@ -14,12 +14,12 @@ from calibrate.diagnose.doubts import Named
 from calibrate.diagnose.streams import (
     ClockFit,
     ClockStatus,
-    Curve,
-    Device,
     Outcome,
+    StreamDevice,
     StreamFinding,
     StreamReport,
     Track,
+    TrackCurve,
     clock_between,
     white_noise,
 )
@@ -54,7 +54,7 @@ class StreamPair:
     parts: bool | None  # None: not the same motion, or not known to be
 
 
-def stream_pairs(measured: Mapping[str, Device], simulated: Mapping[str, Device]) -> tuple[StreamPair, ...]:
+def stream_pairs(measured: Mapping[str, StreamDevice], simulated: Mapping[str, StreamDevice]) -> tuple[StreamPair, ...]:
     """Of every device that both recordings have, in the order of the chain.
 
     Where the arms were sent otherwise (a servo corrects what it sees), the others do not part: nothing is expected.
@@ -66,13 +66,13 @@ def stream_pairs(measured: Mapping[str, Device], simulated: Mapping[str, Device]
     return tuple(replace(pair, parts=None) for pair in pairs)
 
 
-def _pair(name: str, measured: Device, simulated: Device) -> StreamPair:
+def _pair(name: str, measured: StreamDevice, simulated: StreamDevice) -> StreamPair:
     """Two sessions were not recorded by one host at one time, so its stamps show nothing: the motion itself does."""
     one, two = measured.track.read(), simulated.track.read()
     clock = clock_between(two, one) if one.channels == two.channels else ClockFit(ClockStatus.UNRELATED)
     if clock.offset_s is None:
         return StreamPair(name, one.unit, clock, 0, None, None, None, None, None, None)
-    left = one.values - Curve(two).at(clock.to_reference(one.time_s))
+    left = one.values - TrackCurve(two).at(clock.to_reference(one.time_s))
     good = np.all(np.isfinite(left), axis=1)
     left, time_s = left[good], one.time_s[good]
     noise = np.hypot(white_noise(one.values), white_noise(two.values))
@@ -151,7 +151,9 @@ def stream_differences(measured: StreamReport | None, simulated: StreamReport | 
     return tuple(d for name in names for d in _between(one.get(name), two.get(name)))
 
 
-def noise_differences(measured: Mapping[str, Device], simulated: Mapping[str, Device]) -> tuple[NoiseDifference, ...]:
+def noise_differences(
+    measured: Mapping[str, StreamDevice], simulated: Mapping[str, StreamDevice]
+) -> tuple[NoiseDifference, ...]:
     """Of devices that both have, where one is clearly noisier."""
     out: list[NoiseDifference] = []
     for name in measured.keys() & simulated.keys():

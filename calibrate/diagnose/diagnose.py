@@ -17,10 +17,10 @@ from calibrate.diagnose.doubts.diagnosis import (
     Rejected,
     RivalName,
 )
-from calibrate.diagnose.doubts.doubt import Doubted, doubted
-from calibrate.diagnose.doubts.drifts import parted_by_time
+from calibrate.diagnose.doubts.doubt import Assessed, assessed
 from calibrate.diagnose.doubts.findings import named
-from calibrate.diagnose.doubts.proof import floors, proofs
+from calibrate.diagnose.doubts.missing_columns import separated_by_time
+from calibrate.diagnose.doubts.unseen_rows import floors, proofs
 from calibrate.diagnose.search.bench import recent_menu
 from calibrate.diagnose.search.noise_law import noise_law
 from calibrate.diagnose.search.searching import Search
@@ -50,11 +50,11 @@ def diagnose(
     """
     stages = Stages() if stages is None else stages
 
-    def causes(found: Doubted) -> None:
+    def causes(found: Assessed) -> None:
         if known is not None:
             known(replace(_without_proof(found, missing), incomplete=stages.not_yet(Stage.PREDICTION)))
 
-    found = doubted(state, rng, missing, stages, causes)
+    found = assessed(state, rng, missing, stages, causes)
     at, attempt = found.at, stages.attempt
     samples = np.unique(at.state.rows.sample[at.state.rows.data])
     wanders = attempt(Stage.NOISE, lambda: _wanders(at, rng), otherwise=False)
@@ -72,7 +72,7 @@ def diagnose(
     return whole
 
 
-def _without_proof(found: Doubted, missing: Sequence[Missing]) -> Diagnosis:
+def _without_proof(found: Assessed, missing: Sequence[Missing]) -> Diagnosis:
     return Diagnosis(
         verdict=found.verdict,
         findings=found.findings,
@@ -139,4 +139,4 @@ def to_measure(findings: Sequence[Finding]) -> tuple[str, ...]:
 def _remedy(name: Named, rival: RivalName) -> str:
     if rival.alike:
         return WITNESS
-    return COOLED if parted_by_time(name, rival.name) else POSES
+    return COOLED if separated_by_time(name, rival.name) else POSES

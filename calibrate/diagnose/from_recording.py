@@ -13,12 +13,12 @@ from scipy.stats import norm
 
 from acquisition.recording import Samples
 from acquisition.recording.rig import Rig
+from calibrate.diagnose import limits
 from calibrate.diagnose.diagnose import diagnose
 from calibrate.diagnose.doubts.diagnosis import Diagnosis, Unexplained, Verdict
 from calibrate.diagnose.doubts.doubt import records
-from calibrate.diagnose.doubts.drifts import doubtful
 from calibrate.diagnose.doubts.free_space_change import FreeSpaceChange, free_space_change
-from calibrate.diagnose.doubts.hidden_levers import TIME
+from calibrate.diagnose.doubts.missing_columns import TIME, doubtful
 from calibrate.diagnose.doubts.stated_noise import (
     NoiseFound,
     Statement,
@@ -26,9 +26,8 @@ from calibrate.diagnose.doubts.stated_noise import (
     missing_words,
     noise_found,
 )
-from calibrate.diagnose.gross_errors_first import Cleared, blunders_first
-from calibrate.diagnose.outlying_rows import unexplained_rows
-from calibrate.diagnose.search.tail import LEAST
+from calibrate.diagnose.gross_errors import Cleared, blunders_first, unexplained_rows
+from calibrate.diagnose.search import limits as search_limits
 from calibrate.diagnose.stages import (
     DECIDING,
     Incomplete,
@@ -46,11 +45,6 @@ from calibrate.model.sensors.encoder_difference import NAME as ENCODER_DIFFERENC
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
-
-FEWEST_IN_A_RUN = 3
-RUN_P = 1e-3  # a session in a thousand with gross errors at random
-FAR = 0.02  # of the reach
-FEWEST = 20  # samples: below, no term can be separated from noise, whatever it is
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,8 +90,8 @@ def diagnose_samples(
     cleared = stages.attempt(Stage.FAULTS, lambda: blunders_first(rig, samples), every, refuses=True)
     if cleared.whole_file:
         return Diagnosed(cleared, cleared.blunders, None)
-    if len(cleared.rows) < FEWEST:
-        few = f"{len(cleared.rows)} samples are left to diagnose, fewer than {FEWEST}"
+    if len(cleared.rows) < limits.FEWEST_SAMPLES:
+        few = f"{len(cleared.rows)} samples are left to diagnose, fewer than {limits.FEWEST_SAMPLES}"
         why = f"{few}: no cause can be separated from noise; measure more poses"
         return Diagnosed(cleared, cleared.blunders, None, (Incomplete(Stage.SEARCH, why),))
     geometry = stages.attempt(Stage.GEOMETRY, lambda: begin(session_of(rig, cleared.samples)), None, refuses=True)
@@ -130,7 +124,7 @@ def _another_arm(geometry: Fitted) -> GrossError | None:
     reach_m = float(np.max(np.linalg.norm(flange - geometry.around.frames[:, 0, :3, 3], axis=1)))
     for unseen in geometry.held_out(geometry.active):
         away_m = float(np.median(np.linalg.norm(unseen.misfit[:, :3], axis=1)))
-        if unseen.instrument != ENCODER_DIFFERENCE and away_m > FAR * reach_m:
+        if unseen.instrument != ENCODER_DIFFERENCE and away_m > limits.FAR_OF_REACH * reach_m:
             what = (
                 f"{1e3 * away_m:.3g} mm beside {unseen.instrument} whatever zeros, lengths, base and tool are, "
                 f"{100.0 * away_m / reach_m:.2g} % of a reach of {reach_m:.2g} m: no arm of this table"
@@ -208,8 +202,8 @@ def runs_of(far: Ints, samples: int) -> list[tuple[Ints, float]]:
     (Feller, An introduction to probability theory, vol. 1, 3rd ed. 1968, XIII.7, first term); kept below RUN_P.
     """
     runs = np.split(np.unique(far), np.flatnonzero(np.diff(np.unique(far)) > 1) + 1)
-    each = [(run, samples * (len(far) / samples) ** len(run)) for run in runs if len(run) >= FEWEST_IN_A_RUN]
-    return [(run, max(p, LEAST)) for run, p in each if p < RUN_P]
+    each = [(run, samples * (len(far) / samples) ** len(run)) for run in runs if len(run) >= limits.FEWEST_IN_A_RUN]
+    return [(run, max(p, search_limits.LEAST_P)) for run, p in each if p < limits.RUN_ALPHA]
 
 
 def _together(rows: Ints, share: float, p: float) -> Unexplained:
@@ -234,4 +228,6 @@ def beyond_noise(found: NoiseFound, missing: Sequence[Missing]) -> Unexplained:
     lacking = hidden_of(missing)
     p = float(norm.sf((times**2 - 1.0) / max(2.0 * times * sigma, 1e-300)))
     drivers = tuple(dict.fromkeys(m.driver for m in lacking))
-    return Unexplained("", drivers, 1.0 - 1.0 / times**2, max(p, LEAST), found.says + missing_words(missing))
+    return Unexplained(
+        "", drivers, 1.0 - 1.0 / times**2, max(p, search_limits.LEAST_P), found.says + missing_words(missing)
+    )

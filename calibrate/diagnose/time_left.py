@@ -12,24 +12,17 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
+from calibrate.diagnose import limits
 from calibrate.diagnose.search.bench import Bench
 from calibrate.diagnose.search.noise_law import NoiseLaw, capture_orders, noise_law
-from calibrate.diagnose.search.tail import Tail
-from calibrate.diagnose.state.linearised import Rows
+from calibrate.diagnose.search.null import Tail
+from calibrate.diagnose.state.linearised import WhitenedRows
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 
-BLOCKS = 5  # of equal length along the session
-DRAWS, AT_ONCE = 300, 50
-ALPHA = 0.002  # of all three together
-LARGER = 1.2  # times what noise gives: less decides nothing
-FEWEST = 40  # samples
-FEWEST_PAIRS = 20  # of repeats
+AT_ONCE = 50
 RIDGE = 1e-9
-EDGE = 0.05  # of the session, at either end: too few rows
-LONGEST = 0.95  # correlation of neighbours: noise that has forgotten itself after some sixty rows
-MOST = 0.5  # of the variance
 
 
 @dataclass(frozen=True)
@@ -46,7 +39,7 @@ def time_left(bench: Bench, rng: Generator) -> TimeLeft | None:
     rows, t_s = bench.state.rows, bench.state.drivers.t_s
     sample = np.where(rows.data, rows.sample, -1)
     used = np.unique(sample[sample >= 0])
-    if len(used) < FEWEST:
+    if len(used) < limits.FEWEST_TIMED:
         return None
     order = used[np.argsort(t_s[used], kind="stable")]
     tests = {
@@ -57,7 +50,7 @@ def time_left(bench: Bench, rng: Generator) -> TimeLeft | None:
         tests["repeats disagree more, the farther apart in time they were taken"] = pairs
     law = _short(noise_law(rows, bench.sight, t_s, rng))
     nulls: dict[str, list[Floats]] = {what: [] for what in tests}
-    for _ in range(DRAWS // AT_ONCE):
+    for _ in range(limits.TIME_DRAWS // AT_ONCE):
         drawn = bench.sight.complement(law.draw(rng, AT_ONCE).T)
         for what, value_of in tests.items():
             nulls[what].append(value_of(drawn))
@@ -67,13 +60,20 @@ def time_left(bench: Bench, rng: Generator) -> TimeLeft | None:
         p = min(1.0, len(tests) * Tail(null).p(seen))
         found.append(TimeLeft(what, seen / max(float(np.mean(null)), 1e-300), p))
     worst = min(found, key=lambda one: one.p)
-    return worst if worst.p < ALPHA and worst.ratio > LARGER else None
+    return worst if worst.p < limits.TIME_ALPHA and worst.ratio > limits.TIME_FACTOR else None
 
 
 def _short(law: NoiseLaw) -> NoiseLaw:
     """With wander that lasts for some neighbours only: what lasts for much of a session is not noise."""
     series = tuple(
-        replace(s, wander=replace(s.wander, rho=min(s.wander.rho, LONGEST), share=min(s.wander.share, MOST)))
+        replace(
+            s,
+            wander=replace(
+                s.wander,
+                rho=min(s.wander.rho, limits.WANDER_CORRELATION),
+                share=min(s.wander.share, limits.WANDER_SHARE),
+            ),
+        )
         for s in law.series
     )
     return replace(law, series=series)
@@ -82,7 +82,7 @@ def _short(law: NoiseLaw) -> NoiseLaw:
 Value = Callable[[Floats], Floats]  # (draw, row) of residuals behind geometry -> (draw,)
 
 
-def _level(rows: Rows, t_s: Floats) -> Value:
+def _level(rows: WhitenedRows, t_s: Floats) -> Value:
     """Squares that a change of every channel's mean explains at the moment that suits it best, over the mean square."""
     orders = capture_orders(rows, t_s)
 
@@ -94,7 +94,7 @@ def _level(rows: Rows, t_s: Floats) -> Value:
             before = np.arange(1, n)
             gone = np.cumsum(z, axis=1)[:, :-1] - before[:, None] / n * np.sum(z, axis=1, keepdims=True)
             explained = np.sum(gone**2, axis=2) * n / (before * (n - before))
-            inner = explained[:, int(EDGE * n) : n - int(EDGE * n)]
+            inner = explained[:, int(limits.TIME_EDGE * n) : n - int(limits.TIME_EDGE * n)]
             best = np.maximum(best, inner.max(axis=1) / np.mean(z**2, axis=(1, 2)))
         return best
 
@@ -105,7 +105,7 @@ def _blocks(bench: Bench, order: Ints) -> Value:
     """Squares by which each block of neighbours in time is missed when it is left out, over those of all rows."""
     sample, basis = bench.state.rows.sample, bench.sight.basis
     data = np.flatnonzero(bench.state.rows.data)
-    blocks = [data[np.isin(sample[data], part)] for part in np.array_split(order, BLOCKS)]
+    blocks = [data[np.isin(sample[data], part)] for part in np.array_split(order, limits.TIME_BLOCKS)]
 
     def value(residual: Floats) -> Floats:
         missed = np.zeros(len(residual))
@@ -124,7 +124,7 @@ def _by_gap(bench: Bench) -> Value | None:
     if drivers.repeat is None:
         return None
     a, b, gap_s = repeat_pairs(drivers.repeat, drivers.t_s, rows.sample, rows.group, rows.instrument)
-    if len(np.unique(gap_s)) < FEWEST_PAIRS:
+    if len(np.unique(gap_s)) < limits.FEWEST_TIMED_PAIRS:
         return None
     far = gap_s > np.median(gap_s)
 

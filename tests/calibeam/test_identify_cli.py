@@ -270,7 +270,7 @@ def test_a_refit_that_came_to_no_end_is_partial_and_its_model_is_kept(identified
     refit = ["identify", str(identified[0] / "session"), "--model", str(known), "--out", str(model)]
     assert run(refit) == 0
     assert read_model(model).status == read_model(known).status == "RANK_DEFICIENT"
-    monkeypatch.setattr("calibrate.diagnose.state.fitted.TURNS", 2)
+    monkeypatch.setattr("calibrate.diagnose.limits.FIT_TURNS", 2)
     capsys.readouterr()
     assert run(refit) == 3
     said = f"kmax of [dog-leg] in the fit plan; what was found so far is in {model}"

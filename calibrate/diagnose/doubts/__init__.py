@@ -2,10 +2,9 @@
 limits, and effects that these poses cannot separate.
 """
 
+from calibrate.diagnose.doubts.detection_limits import Isolability, Smallest, isolability, smallest_visible
 from calibrate.diagnose.doubts.diagnosis import Finding, Named, Verdict
 from calibrate.diagnose.doubts.findings import named
-from calibrate.diagnose.doubts.isolability import Isolability, isolability
-from calibrate.diagnose.doubts.smallest_visible import Smallest, smallest_visible
 from calibrate.diagnose.doubts.stated_noise import Statement
 
 __all__ = [

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibrate.diagnose.doubts.lack_of_fit import LackOfFit
-from calibrate.diagnose.doubts.proof import Floor, HeldOut
 from calibrate.diagnose.doubts.stated_noise import NoiseFound
+from calibrate.diagnose.doubts.unseen_rows import Floor, HeldOutProof
 from calibrate.diagnose.stages import Incomplete
 from calibrate.diagnose.state.linearised import State
 from calibrate.model.effects.term import Missing, Size
@@ -120,7 +120,7 @@ class Diagnosis:
     verdict: Verdict
     findings: tuple[Finding, ...]
     unexplained: tuple[Unexplained, ...]
-    proofs: tuple[HeldOut, ...]
+    proofs: tuple[HeldOutProof, ...]
     floors: tuple[Floor, ...]
     lack_of_fit: LackOfFit | None
     noise_wanders: bool

@@ -27,32 +27,27 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
+from calibrate.diagnose.doubts import limits
 from calibrate.diagnose.doubts.diagnosis import (
     UNKNOWN,
     Finding,
     Unexplained,
     Verdict,
 )
-from calibrate.diagnose.doubts.drifts import suspects
-from calibrate.diagnose.doubts.drifts import untold as drift_untold
 from calibrate.diagnose.doubts.findings import bare_findings, findings_of, named
-from calibrate.diagnose.doubts.folds import (
-    FOLDS,
-    REGIONS,
-    blocks,
-    regions,
-    units,
-)
-from calibrate.diagnose.doubts.hidden_levers import TIME
 from calibrate.diagnose.doubts.lack_of_fit import LackOfFit, lack_of_fit
+from calibrate.diagnose.doubts.missing_columns import TIME, suspects
+from calibrate.diagnose.doubts.missing_columns import untold as drift_not_determined
 from calibrate.diagnose.doubts.rivals import Rival, price, rivals_of
 from calibrate.diagnose.doubts.unknown import with_unknowns
 from calibrate.diagnose.doubts.unrecorded import Unrecorded, unrecorded
+from calibrate.diagnose.doubts.unseen_rows import blocks, regions, units
+from calibrate.diagnose.search import limits as search_limits
 from calibrate.diagnose.search.bench import Bench
 from calibrate.diagnose.search.pruning import without
 from calibrate.diagnose.search.score import gain_of
 from calibrate.diagnose.search.search import search
-from calibrate.diagnose.search.searching import BETTER, Search
+from calibrate.diagnose.search.searching import Search
 from calibrate.diagnose.stages import Stage, Stages
 from calibrate.diagnose.state.linearised import State
 from calibrate.diagnose.time_left import TimeLeft, time_left
@@ -61,12 +56,7 @@ from calibrate.model.effects.term import Accepted, Missing
 SPEED = "qd"
 MOTION = ("approach", "last_move")
 LOADS = ("payload", "gravity_torque")
-SEVERAL = 3  # joints: one clock is simpler than slack in each
 
-# Of BIC: no more than a bare mention. Source: Kass, Raftery, Bayes factors, J. Am. Stat. Assoc. 90(430), 1995, section
-# 3.2.
-TIED = 2.0
-ROUNDS = 6
 
 Rivals = tuple[tuple[Rival, ...], ...]
 
@@ -76,11 +66,9 @@ RIDGE = 1e-9  # keeps a direction that only one fold knows finite
 
 Ints = NDArray[np.intp]
 
-MOST = 1200  # rows, 400 positions: an effect of a quarter of the noise is plain to see in so many
-
 
 @dataclass(frozen=True, eq=False)
-class Doubted:
+class Assessed:
     """A model, its findings and what is left over."""
 
     at: Search
@@ -97,13 +85,13 @@ class Doubted:
         return Verdict.UNDECIDABLE if self.unexplained or self.undecided else Verdict.CONSISTENT
 
 
-def doubted(
+def assessed(
     state: State,
     rng: Generator,
     missing: Sequence[Missing] = (),
     stages: Stages | None = None,
-    known: Callable[[Doubted], None] | None = None,
-) -> Doubted:
+    known: Callable[[Assessed], None] | None = None,
+) -> Assessed:
     """Of a state with geometry fitted and no terms; `missing`: what effects of the catalogue lack in this record.
 
     `stages` keeps what fails; `known` is called once as soon as the causes are known, before alternatives and sizes.
@@ -112,7 +100,7 @@ def doubted(
     few = _found(state, rng, stages)
     at = _of_all(few, state)
     if known is not None:
-        known(Doubted(at, bare_findings(at), (), None, (), undecided=True))
+        known(Assessed(at, bare_findings(at), (), None, (), undecided=True))
     nameless = tuple(() for _ in few.state.accepted)
     few, rivals = stages.attempt(Stage.ALTERNATIVES, lambda: _named_best(few), (few, nameless))
     whole = at if at.keys == few.keys else _of_all(few, state)
@@ -138,8 +126,8 @@ def doubted(
     lacking += [m for _, hidden in drifts for m in hidden]
     if left and not lacking:
         lacking = list(missing)
-    unexplained = (*left, *(drift_untold(f, hidden) for f, hidden in drifts))
-    return Doubted(at, findings, unexplained, misfit, records(lacking), stages.undecided)
+    unexplained = (*left, *(drift_not_determined(f, hidden) for f, hidden in drifts))
+    return Assessed(at, findings, unexplained, misfit, records(lacking), stages.undecided)
 
 
 def _found(state: State, rng: Generator, stages: Stages) -> Search:
@@ -192,7 +180,7 @@ def _lagging(at: Search) -> list[int]:
     none where few do.
     """
     lagging = [i for i, a in enumerate(at.state.accepted) if a.term.depends_on[0].startswith(MOTION)]
-    return lagging if len({at.state.accepted[i].term.port.where for i in lagging}) >= SEVERAL else []
+    return lagging if len({at.state.accepted[i].term.port.where for i in lagging}) >= limits.LAGGING_JOINTS else []
 
 
 def _moving(at: Search, speed: Sequence[Missing], lagging: Sequence[int]) -> list[Unexplained]:
@@ -229,7 +217,7 @@ def records(lacking: Sequence[Missing]) -> tuple[str, ...]:
 
 def with_best_names(at: Search) -> tuple[Search, Rivals]:
     """The search with names exchanged, and the alternatives of each term in it."""
-    for _ in range(ROUNDS):
+    for _ in range(limits.NAMING_ROUNDS):
         rivals = _rivals(at.bench)
         changed = _exchanged(at, rivals)
         if changed is None:
@@ -248,13 +236,13 @@ def _exchanged(at: Search, rivals: Rivals) -> Search | None:
         class_ = [(0.0, own), *((r.margin, r.accepted) for r in mine if r.refitted and r.plausible)]
         class_ = [(margin + price(at.bench, a.term), a) for margin, a in class_]
         least = min(margin for margin, _ in class_)
-        near = [c for c in class_ if c[0] <= least + TIED]
+        near = [c for c in class_ if c[0] <= least + limits.NAMES_TIED]
         best = min(near, key=lambda c: (len(c[1].term.depends_on), c[1].term.order or 1, *_rank(at, c, least, own)))[1]
         if best is own:
             continue
         bench = Bench(at.state.refitted([best if j == i else a for j, a in enumerate(at.state.accepted)]))
         dearer = price(at.bench, best.term) - price(at.bench, own.term)
-        if bench.bic + dearer <= at.bench.bic + TIED:
+        if bench.bic + dearer <= at.bench.bic + limits.NAMES_TIED:
             return replace(at.at(bench), p=at.p | {best.term.key: at.p.get(own.term.key, 0.0)})
     return None
 
@@ -262,9 +250,9 @@ def _exchanged(at: Search, rivals: Rivals) -> Search | None:
 def _rank(at: Search, candidate: tuple[float, Accepted], least: float, own: Accepted) -> tuple[float, int]:
     """By margin; a hair's breadth is no reason: what nothing separates is named in the catalogue's order."""
     margin, accepted = candidate
-    if margin <= least + BETTER:
+    if margin <= least + search_limits.BETTER:
         return least, at.bench.menu.place_of(accepted.term)
-    return (margin - BETTER if accepted is own else margin), 0
+    return (margin - search_limits.BETTER if accepted is own else margin), 0
 
 
 def predicts(bench: Bench) -> Floats:
@@ -276,7 +264,7 @@ def predicts(bench: Bench) -> Floats:
     """
     rows, data = bench.state.rows, np.flatnonzero(bench.state.rows.data)
     out, known = np.full(len(bench.gone), np.inf), np.zeros(len(bench.gone))
-    for parts, count in ((blocks(bench.state.drivers), FOLDS), (regions(bench.state.drivers), REGIONS)):
+    for parts, count in ((blocks(bench.state.drivers), limits.FOLDS), (regions(bench.state.drivers), limits.REGIONS)):
         part = parts[rows.sample[data]]
         folds, met = [data[part % count == fold] for fold in range(count)], np.unique(part)
         whole = _unseen_squares(bench.sight.basis, bench.sight.residual, folds, bench.geometry)
@@ -310,7 +298,7 @@ def _unseen_squares(basis: Floats, residual: Floats, folds: Sequence[Ints], geom
 def thinned(state: State, rng: Generator) -> State:
     """The state itself, or fitted to samples drawn at random; repeats stay together."""
     samples = np.unique(state.rows.sample[state.rows.data])
-    most = MOST * len(samples) // max(int(state.rows.data.sum()), 1)
+    most = limits.MOST_ROWS * len(samples) // max(int(state.rows.data.sum()), 1)
     if len(samples) <= most:
         return state
     label = units(state.drivers)[samples]

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import poisson
 
+from calibrate.diagnose.doubts import limits
 from calibrate.diagnose.doubts.diagnosis import (
     NAMED,
     NOT_FINAL,
@@ -49,20 +50,9 @@ from calibrate.model.effects.term import (
 
 Floats = NDArray[np.float64]
 
-ALIKE = 1e-6  # sine between what two names can make of the readings
-FAINT = 0.05  # a name that is less likely is none
-SIGMAS = 3.0  # of a size, for a name
 NO_SIZE = ("phase", "time", "period", "degree", "order")  # words of parameters for where or when, not how much
 WEIGHTS = ("gravity_torque", "overturning_moment", "payload")
-# Of the greatest cause by weight: less may be what an unknown load, or the weight of a link itself, adds to that one.
-# Where all weights are stated they are off by a fifth at most, its square at the port itself.
-MISWEIGHED = 0.2
 OF_ANGLES = re.compile(r"(q|gravity_torque)\d+")
-LEFTOVER = 0.1  # of what an unknown cause explains: a curve may leave so much of a law that it only resembles
-
-SEVERAL = 3  # two may share a joint
-BY_CHANCE = 0.01  # that so many faults meet at one of the places
-UNSEEN = 0.5  # of a fault, for those elsewhere that are too small to be found (Jeffreys' prior of a Poisson rate)
 
 
 def named(term: Term) -> Named:
@@ -93,7 +83,10 @@ def findings_of(
     slight = [any(_misweighed(f, load, weighed) for load in loads) for f in names]
     doubtful = [less or not (final and _final(f, unknown)) for f, less in zip(names, slight, strict=True)]
     names = [f.believed(NOT_FINAL) if less else f for f, less in zip(names, doubtful, strict=True)]
-    sure = [i not in untold and f.confidence >= FAINT and _sized(f) for i, f in zip(closed, names, strict=True)]
+    sure = [
+        i not in untold and f.confidence >= limits.LEAST_CONFIDENCE and _sized(f)
+        for i, f in zip(closed, names, strict=True)
+    ]
     names = [f if ok else _unsure(at, i, f, predicts) for i, f, ok in zip(closed, names, sure, strict=True)]
     explained = max(sum(f.share for f in (*names, *unknown)), 1e-300)
     found = [replace(f, share=f.share / explained) for f in (*_no_leftovers(names, unknown), *unknown)]
@@ -105,15 +98,15 @@ def _sized(finding: Finding) -> bool:
     each may be vague and all together plain; those that the data do not determine decide nothing.
     """
     told = [size for name, size in finding.parameters.items() if not name.startswith(NO_SIZE)]
-    return len(told) != 1 or not abs(told[0].value) < SIGMAS * told[0].sigma < np.inf
+    return len(told) != 1 or not abs(told[0].value) < limits.SIZE_SIGMAS * told[0].sigma < np.inf
 
 
 def _unsure(at: Search, i: int, finding: Finding, predicts: Floats) -> Finding:
     """The unknown cause in the place of a name that is hardly likely, or of no certain size. The name stays among what
     it could be; all names together are no more likely than not.
     """
-    found, doubted = unknown_cause(at, (i,), predicts), finding.believed(NOT_FINAL)
-    rivals = (RivalName(doubted.name, doubted.confidence, 0.0, refitted=True), *doubted.rivals)
+    found, assessed = unknown_cause(at, (i,), predicts), finding.believed(NOT_FINAL)
+    rivals = (RivalName(assessed.name, assessed.confidence, 0.0, refitted=True), *assessed.rivals)
     left = max(found.confidence - sum(rival.confidence for rival in rivals), 0.0)
     return replace(found, confidence=left, rivals=rivals, variant=finding.variant)
 
@@ -156,7 +149,7 @@ def _final(finding: Finding, unknown: Sequence[Finding]) -> bool:
 
     A cause that is in no catalogue need not act through one port only.
     """
-    return not any(finding.share < LEFTOVER * u.share or _within(finding.name, u.name) for u in unknown)
+    return not any(finding.share < limits.CURVE_LEFTOVER * u.share or _within(finding.name, u.name) for u in unknown)
 
 
 def _within(name: Named, unknown: Named) -> bool:
@@ -168,8 +161,8 @@ def _within(name: Named, unknown: Named) -> bool:
 def _misweighed(finding: Finding, load: Finding, weighed: bool) -> bool:
     """Whether a cause may be what the weights behind a greater one are off by."""
     here = finding.name.where == load.name.where and all(OF_ANGLES.fullmatch(name) for name in finding.name.depends_on)
-    unknown = not weighed and _by_weight(finding.name) and finding.share < MISWEIGHED * load.share
-    return unknown or (here and finding.share < MISWEIGHED**2 * load.share)
+    unknown = not weighed and _by_weight(finding.name) and finding.share < limits.LOAD_SHARE * load.share
+    return unknown or (here and finding.share < limits.LOAD_SHARE**2 * load.share)
 
 
 def _by_weight(name: Named) -> bool:
@@ -214,7 +207,7 @@ def _rival(bench: Bench, own: Accepted, rival: Rival, belief: float) -> RivalNam
 
 def _alike(one: Floats, other: Floats) -> bool:
     """Whether two orthonormal bases (row, rank) span the same."""
-    return one.shape == other.shape and bool(np.linalg.norm(other - one @ (one.T @ other)) < ALIKE)
+    return one.shape == other.shape and bool(np.linalg.norm(other - one @ (one.T @ other)) < limits.SAME_EFFECT)
 
 
 def _no_leftovers(names: Sequence[Finding], unknown: Sequence[Finding]) -> list[Finding]:
@@ -238,8 +231,8 @@ def pieces(accepted: Sequence[Accepted], places: int) -> list[tuple[int, ...]]:
 
 def _meet_too_often(here: int, elsewhere: int, places: int) -> bool:
     """Whether so many names at one of the places are no chance, at the rate of all others."""
-    rate = (elsewhere + UNSEEN) / max(places - 1, 1)
-    return here >= SEVERAL and float(poisson.sf(here - 1, rate)) * places < BY_CHANCE
+    rate = (elsewhere + limits.UNSEEN_FAULTS) / max(places - 1, 1)
+    return here >= limits.FAULTS_AT_ONE_PLACE and float(poisson.sf(here - 1, rate)) * places < limits.FAULTS_BY_CHANCE
 
 
 def _of_pose(driver: str) -> bool:

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
+from calibrate.diagnose.doubts import limits
 from calibrate.diagnose.state.fitted import Fitted
 from calibrate.model.checks.rough_fit import rough_fit
 from calibrate.model.effects.drivers import Drivers
@@ -25,9 +26,7 @@ from calibrate.model.with_effects.ported_chain import flange_twists, perturbed_f
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 
-POSES = 300
 AT_ONCE = 30  # poses
-AMONG = 100.0  # measured poses, copies counted, for each new one: what is chosen by the poses stays as it was to 1 %
 
 
 @dataclass(frozen=True)
@@ -43,9 +42,9 @@ def free_space_change(before: Fitted, after: Fitted, rng: Generator) -> FreeSpac
     """Of geometry alone and with terms, of one session. None where a term cannot be evaluated at other poses."""
     session, n_arm = after.session, len(after.session.arm.parameters)
     measured = session.samples.joints()
-    q_rad = rng.uniform(measured.min(axis=0), measured.max(axis=0), (POSES, measured.shape[1]))
-    like = rng.integers(len(measured), size=POSES)
-    nothing = Perturbation.none(POSES, measured.shape[1])
+    q_rad = rng.uniform(measured.min(axis=0), measured.max(axis=0), (limits.WORKSPACE_POSES, measured.shape[1]))
+    like = rng.integers(len(measured), size=limits.WORKSPACE_POSES)
+    nothing = Perturbation.none(limits.WORKSPACE_POSES, measured.shape[1])
     frames = perturbed_frames(session.arm, after.geometry[:n_arm], q_rad, nothing)
     by, slopes, columns = nothing, list[Floats](), list[int]()
     for i, accepted in enumerate(after.accepted):
@@ -64,12 +63,12 @@ def free_space_change(before: Fitted, after: Fitted, rng: Generator) -> FreeSpac
     # At the poses of the twists: frames that are unknown would else be taken out a little askew, and they are far off.
     doubt = _doubt(after, frames[:, -1], point_m, np.concatenate([arm, *slopes], axis=2), [*range(n_arm), *columns])
     missed = _missed(alone, truth, point_m)
-    return FreeSpaceChange(float(np.sqrt(missed + doubt)), float(np.sqrt(doubt)), POSES)
+    return FreeSpaceChange(float(np.sqrt(missed + doubt)), float(np.sqrt(doubt)), limits.WORKSPACE_POSES)
 
 
 def _told(accepted: Accepted, drivers: Drivers, q_rad: Floats, frames: Floats, like: Ints) -> Floats | None:
     """(pose, width, coefficient) what a term adds at the poses, some at a time; None: it has no value there."""
-    copies = max(1, int(np.ceil(AMONG * AT_ONCE / len(drivers.q_rad))))
+    copies = max(1, int(np.ceil(limits.POSES_FOR_ONE_NEW * AT_ONCE / len(drivers.q_rad))))
     parts: list[Floats] = []
     for i in range(0, len(like), AT_ONCE):
         some = slice(i, i + AT_ONCE)

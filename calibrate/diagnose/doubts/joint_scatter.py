@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import gammaln
 
+from calibrate.diagnose.doubts import limits
 from calibrate.fit.noise import NU
 
 Floats = NDArray[np.float64]
@@ -20,8 +21,6 @@ LOUDNESS = (0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 100.0, 1000.0, 1e4)  # variance thro
 SHARES = (0.15, 0.3, 0.5, 0.7, 0.85)  # of samples that scatter through the joints
 TURNS = 12
 HEAVY = (2.5, NU)  # degrees of freedom of innocent tails
-UNEQUAL = 3.0  # times: the joint that repeats worst against the best one of a sound arm
-STEPS = 4  # from the best to the worst
 SWEEPS = 6  # over the joints
 BLOCK = 3  # channels of one unit: a position, a rotation; two detectors have one unit, too
 
@@ -90,9 +89,9 @@ def _unequal(raw: Floats, joints: Floats, best: _Trial) -> _Trial:
             for step in (-1, 1):
                 moved = steps.copy()
                 moved[joint] += step
-                if np.ptp(moved) > STEPS:
+                if np.ptp(moved) > limits.UNEQUAL_STEPS:
                     continue
-                unequal = replace(best, sizes=UNEQUAL ** (moved / STEPS))
+                unequal = replace(best, sizes=limits.UNEQUAL_JOINTS ** (moved / limits.UNEQUAL_STEPS))
                 trial = _judged(unequal.seen(raw, joints), unequal)
                 if trial.two_log_likelihood > best.two_log_likelihood:
                     best, steps = trial, moved

@@ -10,13 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import fdtrc
 
+from calibrate.diagnose.doubts import limits
 from calibrate.diagnose.search.bench import Bench
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
-
-ALARM_P = 0.01
-FEWEST = 4  # groups
 
 
 @dataclass(frozen=True)
@@ -29,7 +27,7 @@ class LackOfFit:
 
     @property
     def significant(self) -> bool:
-        return self.p < ALARM_P
+        return self.p < limits.REPEATS_ALPHA
 
 
 def lack_of_fit(bench: Bench) -> LackOfFit | None:
@@ -48,7 +46,7 @@ def lack_of_fit(bench: Bench) -> LackOfFit | None:
             between += float(len(z) * z.mean() ** 2)
             dof_within, dof_between = dof_within + len(z) - 1, dof_between + 1
         groups += 1
-    if groups < FEWEST or dof_within == 0 or within <= 0.0:
+    if groups < limits.FEWEST_GROUPS or dof_within == 0 or within <= 0.0:
         return None
     # Geometry follows the means a little: as much as its share of all data.
     free = dof_between * (1.0 - bench.sight.basis.shape[1] / bench.sight.data)

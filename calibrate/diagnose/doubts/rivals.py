@@ -9,8 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from calibrate.diagnose.doubts import limits
 from calibrate.diagnose.search.bench import Bench
-from calibrate.diagnose.search.proposals import proposals
+from calibrate.diagnose.search.growing import proposals
 from calibrate.diagnose.search.score import Removed, gain_of, scores
 from calibrate.diagnose.search.searching import Key, cause_of, taken
 from calibrate.model.effects.curve import is_slow_cause
@@ -18,16 +19,7 @@ from calibrate.model.effects.term import Accepted, Term
 
 Floats = NDArray[np.float64]
 
-WITHIN = 6.0  # of BIC: beyond, strong evidence against (mismatch catalogue, alternatives)
-NEAR = 20.0  # of BIC by the linear score: refitted to be sure
-REFITS = 4  # of the nearest ones
-FEW = 4  # terms: in larger models the linear margin has to do, a refit costs seconds
-LARGE = 800  # samples: the same of larger sessions
 WARMTH = "temp_"
-
-# Odds before any reading, of names for one pattern that turns with weight, beside a soft joint. A harmonic drive yields
-# 10 to 70 µrad per Nm (mismatch catalogue); a bolted foot, a cast link and a flanged tool are several times as stiff.
-ODDS = {"base-compliance": 1.0 / 2.0, "link-bending": 1.0 / 4.0, "tool-sag": 1.0 / 8.0}
 
 
 @dataclass(frozen=True)
@@ -47,11 +39,15 @@ class Rival:
 def rivals_of(bench: Bench, i: int) -> tuple[Rival, ...]:
     """Of accepted term i: all candidates within 6 BIC, nearest first; sizes that no machine has, only if better."""
     gone, own = bench.gone[i], bench.state.accepted[i].term
-    refits = REFITS if len(bench.state.accepted) <= FEW and bench.state.samples <= LARGE else 0
+    refits = (
+        limits.ALTERNATIVE_REFITS
+        if len(bench.state.accepted) <= limits.REFITTED_TERMS and bench.state.samples <= limits.REFITTED_SAMPLES
+        else 0
+    )
     near = _near(bench, gone, gain_of(gone, bench.sight), taken(bench, (i,)) | {cause_of(own)})
     found = [_confirmed(bench, i, r) if rank < refits or r.margin < 0.0 else r for rank, r in enumerate(near)]
     known = [r for r in found if r is not None and r.term.key != own.key]
-    kept = [r for r in known if r.margin - _clock_price(bench, own, r.term) <= WITHIN]
+    kept = [r for r in known if r.margin - _clock_price(bench, own, r.term) <= limits.ALTERNATIVE_WITHIN]
     return tuple(sorted(kept, key=lambda r: r.margin))
 
 
@@ -71,7 +67,7 @@ def price(bench: Bench, term: Term) -> float:
     The thermometer at the place itself is free, any other one is one of many. Source: extended BIC, Chen, Chen,
     Biometrika 95(3), 2008, gamma = 1.
     """
-    odds = -2.0 * float(np.log(ODDS.get(term.physics, 1.0)))
+    odds = -2.0 * float(np.log(limits.ODDS_BESIDE_COMPLIANCE.get(term.physics, 1.0)))
     driver, where = term.depends_on[0], term.port.where
     if not driver.startswith(WARMTH) or where.startswith(driver.removeprefix(WARMTH) + "."):
         return odds
@@ -95,7 +91,7 @@ def confidences(bench: Bench, own: Term, rivals: Sequence[Rival]) -> Floats:
 def _near(bench: Bench, gone: Removed, worth: float, taken: frozenset[Key]) -> list[Rival]:
     """One of every cause."""
     out: dict[Key, Rival] = {}
-    for proposal in proposals(bench, scores(bench.menu, gone), gone, worth - NEAR, taken):
+    for proposal in proposals(bench, scores(bench.menu, gone), gone, worth - limits.ALTERNATIVE_NEAR, taken):
         own, margin = proposal.accepted, worth - proposal.gain
         plausible = own.term.plausible(own.coefficients, own.inner, bench.noise_rad)
         if plausible or margin < 0.0:

@@ -15,10 +15,11 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
+from calibrate.diagnose.doubts import limits
 from calibrate.diagnose.doubts.joint_scatter import innocent
-from calibrate.diagnose.search.tail import Tail
+from calibrate.diagnose.search.null import Tail
 from calibrate.diagnose.state.fitted import Fitted
-from calibrate.diagnose.state.linearised import Unseen, tame
+from calibrate.diagnose.state.linearised import UnseenRows, tame
 from calibrate.diagnose.state.noise_of_fit import freedom
 from calibrate.fit.identify.session import assumed_sigma
 from calibrate.model.checks.gross_error import postures
@@ -30,18 +31,6 @@ from calibrate.model.sensors.kind import Quantity, SensorKind, Trait
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 
-MORE = 1.5  # times the stated noise: a statement is not more exact than that
-SIGMAS = 3.0  # of the mean square, by which it has to be beyond the statement
-WRONG_BY = 10.0  # statements of rig files are wrong by up to 8 (mismatch study, second set, lesson 14); beyond: physics
-CLOSE = 3  # rows from one repeat to the next, at most, that are close in time
-FEWEST_PAIRS = 8  # of repeats close in time
-LESS = 1.3  # times the scatter of repeats close in time: what is left is more than noise
-THROUGH_JOINTS = 12.0  # 2 ln L by which scatter follows the levers of the joints (up to as many sizes as joints)
-ALIKE = 0.005  # chance of neighbours in posture erring alike as much
-PART = 0.2  # of the variance: less may be what small effects leave beside a noise
-DRAWS = 400
-FEWEST = 30  # observations
-NEIGHBOURS = 3
 HIDDEN = ("cmd_minus_q", "approach", "qd", "payload")  # drivers that make poses scatter when they are not recorded
 
 
@@ -108,7 +97,7 @@ def hidden_of(missing: Sequence[Missing]) -> tuple[Missing, ...]:
 
 
 def _found(
-    model: Fitted, i: int, quantity: Quantity, unseen: Unseen, larger: float, rng: Generator, *, elsewhere: bool
+    model: Fitted, i: int, quantity: Quantity, unseen: UnseenRows, larger: float, rng: Generator, *, elsewhere: bool
 ) -> NoiseFound:
     name, misfit = unseen.instrument, unseen.misfit[:, quantity.part]
     stated = _stated(model, i, quantity)
@@ -121,10 +110,10 @@ def _found(
     mean, error = float(np.mean(square)), float(np.std(square) / np.sqrt(len(square)))
     times = float(np.sqrt(mean))
     answer, supports, opposes = Statement.AGREES, (), ()
-    if times > MORE and mean - 1.0 > SIGMAS * error:
+    if times > limits.MORE_THAN_STATED and mean - 1.0 > limits.MORE_THAN_STATED_SIGMAS * error:
         supports, opposes = _evidence(model, i, quantity, unseen, good, rng)
-        if supports + opposes and times > WRONG_BY:
-            opposes = (f"no statement is wrong by more than {WRONG_BY:.0f} times", *opposes)
+        if supports + opposes and times > limits.STATEMENT_WRONG_BY:
+            opposes = (f"no statement is wrong by more than {limits.STATEMENT_WRONG_BY:.0f} times", *opposes)
         noise = Statement.EXCEEDED if opposes or elsewhere else Statement.WRONG
         answer = noise if supports + opposes else Statement.UNTESTED
     said, sigma = float(np.sqrt(np.mean(stated**2))), float(error / max(2.0 * times, 1e-300))
@@ -165,11 +154,11 @@ def _levers(model: Fitted, i: int, quantity: Quantity) -> Floats:
 
 
 def _evidence(
-    model: Fitted, i: int, quantity: Quantity, unseen: Unseen, good: NDArray[np.bool_], rng: Generator
+    model: Fitted, i: int, quantity: Quantity, unseen: UnseenRows, good: NDArray[np.bool_], rng: Generator
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """What supports that the scatter is noise, and what opposes it; nothing of either where rows are too few."""
     misfit, sample, drivers = unseen.misfit[good][:, quantity.part], unseen.sample[good], model.drivers
-    if len(misfit) < FEWEST:
+    if len(misfit) < limits.NOISE_OBSERVATIONS:
         return (), ()
     told = [
         _close_in_time(misfit, np.array([]) if drivers.repeat is None else drivers.repeat[sample], sample),
@@ -194,11 +183,11 @@ def _whitened(
 def _close_in_time(misfit: Floats, repeat: Ints, sample: Ints) -> tuple[bool, str] | None:
     """Repeats that follow one another within a few rows: nothing but noise has changed between them."""
     pairs = close_pairs(repeat, sample)
-    if len(pairs) < FEWEST_PAIRS:
+    if len(pairs) < limits.CLOSE_PAIRS:
         return None
     close = float(np.sqrt(np.mean((misfit[pairs[:, 0]] - misfit[pairs[:, 1]]) ** 2) / 2.0))
     ratio = float(np.sqrt(np.mean(misfit**2))) / max(close, 1e-300)
-    if ratio <= LESS * (1.0 + 1.0 / np.sqrt(len(pairs) * misfit.shape[1])):
+    if ratio <= limits.BEYOND_REPEATS * (1.0 + 1.0 / np.sqrt(len(pairs) * misfit.shape[1])):
         return True, f"{len(pairs)} repeats taken close in time scatter as much"
     return False, f"{len(pairs)} repeats taken close in time scatter {ratio:.2g} times less"
 
@@ -209,14 +198,17 @@ def close_pairs(repeat: Ints, sample: Ints) -> Ints:
     for group in np.unique(repeat[repeat >= 0]):
         mine = np.flatnonzero(repeat == group)
         mine = mine[np.argsort(sample[mine], kind="stable")]
-        out += [(int(a), int(b)) for a, b in pairwise(mine) if sample[b] - sample[a] <= CLOSE]
+        out += [(int(a), int(b)) for a, b in pairwise(mine) if sample[b] - sample[a] <= limits.ROWS_CLOSE_IN_TIME]
     return np.array(out, dtype=np.intp).reshape(-1, 2)
 
 
 def _by_lever(misfit: Floats, joints: Floats, *, stated: bool) -> tuple[bool, str]:
     """Noise of an instrument does not know how far the joints are. `stated`: how well joints come back is."""
     through, plain = innocent(misfit, joints), innocent(misfit, 0.0 * joints)
-    if through.two_log_likelihood - plain.two_log_likelihood > THROUGH_JOINTS and through.share > PART:
+    if (
+        through.two_log_likelihood - plain.two_log_likelihood > limits.THROUGH_JOINTS
+        and through.share > limits.STRUCTURE_SHARE
+    ):
         size = np.sqrt(through.share * np.mean(misfit**2) / np.mean(np.sum(joints**2, axis=0)))
         back = f" as if each came back within {_size(size, 'rad')}; state [noise] joint_rad where the arm is known to"
         return False, f"the scatter follows the levers of the joints{'' if stated else back}"
@@ -227,9 +219,11 @@ def _by_posture(misfit: Floats, q_rad: Floats, sample: Ints, rng: Generator) -> 
     """Noise does not come back at the same posture. Null: rows exchanged."""
     near = neighbours(q_rad, sample)
     z = misfit / np.sqrt(np.mean(misfit**2))
-    drawn = np.array([_alike(z[order], near) for order in (rng.permutation(len(z)) for _ in range(DRAWS))])
+    drawn = np.array(
+        [_alike(z[order], near) for order in (rng.permutation(len(z)) for _ in range(limits.NEIGHBOURS_DRAWS))]
+    )
     seen = _alike(z, near)
-    if seen > PART and Tail(drawn).p(seen) < ALIKE:
+    if seen > limits.STRUCTURE_SHARE and Tail(drawn).p(seen) < limits.NEIGHBOURS_ALPHA:
         return False, "neighbours in posture taken at other times err alike"
     return True, "neighbours in posture taken at other times do not err alike"
 
@@ -237,9 +231,9 @@ def _by_posture(misfit: Floats, q_rad: Floats, sample: Ints, rng: Generator) -> 
 def neighbours(q_rad: Floats, sample: Ints) -> Ints:
     """(row, few) the rows nearest in posture, of those taken at other times."""
     posture = postures(q_rad)
-    near = KDTree(posture).query(posture, k=min(len(q_rad), NEIGHBOURS + 2 * CLOSE + 1))[1]
-    soon = np.abs(sample[near] - sample[:, None]) <= CLOSE
-    return np.take_along_axis(near, np.argsort(soon, axis=1, kind="stable"), axis=1)[:, :NEIGHBOURS]
+    near = KDTree(posture).query(posture, k=min(len(q_rad), limits.NEIGHBOURS + 2 * limits.ROWS_CLOSE_IN_TIME + 1))[1]
+    soon = np.abs(sample[near] - sample[:, None]) <= limits.ROWS_CLOSE_IN_TIME
+    return np.take_along_axis(near, np.argsort(soon, axis=1, kind="stable"), axis=1)[:, : limits.NEIGHBOURS]
 
 
 def _alike(z: Floats, near: Ints) -> float:

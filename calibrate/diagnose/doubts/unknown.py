@@ -12,9 +12,11 @@ from itertools import combinations
 
 import numpy as np
 
+from calibrate.diagnose.doubts import limits
+from calibrate.diagnose.search import limits as search_limits
 from calibrate.diagnose.search.bench import Bench
 from calibrate.diagnose.search.noise_law import NoiseLaw, noise_law
-from calibrate.diagnose.search.null import is_slow
+from calibrate.diagnose.search.null import Tail, is_slow
 from calibrate.diagnose.search.open_families import (
     Allowed,
     Families,
@@ -23,27 +25,14 @@ from calibrate.diagnose.search.open_families import (
     fitted_curve,
     open_families,
 )
-from calibrate.diagnose.search.pruning import CANCELS
 from calibrate.diagnose.search.score import gain_of, removed
 from calibrate.diagnose.search.search import grown_out, settled
-from calibrate.diagnose.search.searching import (
-    ALPHA_FURTHER,
-    SURE,
-    Key,
-    Search,
-    cause_of,
-    holds,
-)
-from calibrate.diagnose.search.tail import Tail
+from calibrate.diagnose.search.searching import Key, Search, cause_of, holds
 from calibrate.model.effects.curve import SmoothCurve
 from calibrate.model.effects.ports import Place
 from calibrate.model.effects.term import Accepted, Term
 
-DRAWS = 120
-ROOM, ALPHA_ROOM = "temp_room", 1e-4  # of a joint that seems to follow the room
-FORBIDS = 10.0  # BIC by which an open family beats the best name
-ROUNDS = 6
-CURVES = 4  # in a row without a name between them, before the search goes on
+ROOM = "temp_room"
 
 Keys = frozenset[Key]
 
@@ -59,15 +48,15 @@ class Case:
 
 def with_unknowns(at: Search) -> Search:
     """Names replaced where an open family forbids them, curves added where structure remains."""
-    before, given_up, vain = at.keys, frozenset[Keys](), frozenset[Key]()
-    for _ in range(ROUNDS):
+    before, given_up, vanished = at.keys, frozenset[Keys](), frozenset[Key]()
+    for _ in range(limits.UNKNOWN_ROUNDS):
         changed, gone = _forbidden(at, open_families(at.bench), given_up)
         given_up |= gone
-        changed = _filled(changed, vain, grown=changed is at)
+        changed = _filled(changed, vanished, grown=changed is at)
         if changed is at:
             break
         new = grown_out(changed)
-        vain |= changed.keys - new.keys  # added, and gone again: the next round would do the same
+        vanished |= changed.keys - new.keys  # added, and gone again: the next round would do the same
         at = at if new.keys == at.keys else new
     return at if at.keys == before else settled(at)
 
@@ -113,7 +102,7 @@ def _enough(at: Search, count: int) -> float:
     Source: extended BIC, Chen, Chen, Biometrika 95(3), 2008, gamma = 1.
     """
     picked = 2.0 * float(np.log(max(len(at.bench.menu.terms), 1)))
-    return FORBIDS - picked * (count - 1)
+    return limits.UNKNOWN_BEATS_NAME - picked * (count - 1)
 
 
 def _groups(at: Search) -> list[tuple[int, ...]]:
@@ -136,17 +125,17 @@ def cancel(bench: Bench, group: Sequence[int]) -> bool:
     """Whether accepted terms all but balance each other: no machine does, together they are something else."""
     felt = [bench.behind(bench.state.accepted[i]) for i in group]
     total = np.sum(felt, axis=0)
-    return bool(total @ total < CANCELS * sum(float(f @ f) for f in felt))
+    return bool(total @ total < search_limits.CANCELS * sum(float(f @ f) for f in felt))
 
 
-def _filled(at: Search, vain: frozenset[Key], grown: bool) -> Search:
-    """With open terms, none of them `vain`, for structure that is significant against the null of all open families.
+def _filled(at: Search, vanished: frozenset[Key], grown: bool) -> Search:
+    """With open terms, none of them `vanished`, for structure that is significant against the null of all open terms.
 
     `grown`: no name is left that could be added; else a curve has to be better than any, too.
     """
-    for turn in range(CURVES):
-        least = 0.0 if grown and turn == 0 else _best_name(at) + FORBIDS
-        more = _remaining(at, vain, least)
+    for turn in range(limits.CURVES_IN_A_ROW):
+        least = 0.0 if grown and turn == 0 else _best_name(at) + limits.UNKNOWN_BEATS_NAME
+        more = _remaining(at, vanished, least)
         if more is None:
             return at
         at = more
@@ -160,32 +149,32 @@ def _follows_room(term: Term) -> bool:
 
 def _p_of(at: Search, families: Families, law: NoiseLaw, offer: Offer, allowed: Allowed) -> float:
     """That noise alone makes any open term that is allowed seem so good."""
-    if offer.gain >= SURE:
+    if offer.gain >= search_limits.SURE:
         return 0.0
-    noise = law.draw(at.rng, DRAWS)
+    noise = law.draw(at.rng, limits.UNKNOWN_DRAWS)
     left = noise - at.bench.sight.basis @ (at.bench.sight.basis.T @ noise)
     return Tail(families.maxima(left, allowed)).p(offer.gain)
 
 
-def _remaining(at: Search, vain: frozenset[Key], least: float) -> Search | None:
-    """With the best open term of more than the `least` gain that is not `vain`."""
+def _remaining(at: Search, vanished: frozenset[Key], least: float) -> Search | None:
+    """With the best open term of more than the `least` gain that is not `vanished`."""
     families = open_families(at.bench)
     law = noise_law(at.state.rows, at.bench.sight, at.state.drivers.t_s, at.rng)
     free = _beside([a.term for a in at.state.accepted])
 
     def allowed(term: Term) -> bool:
-        return free(term) and term.key not in vain and not (law.wanders and is_slow(term))
+        return free(term) and term.key not in vanished and not (law.wanders and is_slow(term))
 
     offer = families.best(None, allowed, least)
     p = 1.0 if offer is None else _p_of(at, families, law, offer, allowed)
-    if offer is not None and _follows_room(offer.term) and p > ALPHA_ROOM:
+    if offer is not None and _follows_room(offer.term) and p > limits.ROOM_ALPHA:
 
         def elsewhere(term: Term) -> bool:
             return allowed(term) and not _follows_room(term)
 
         offer = families.best(None, elsewhere, least)
         p = 1.0 if offer is None else _p_of(at, families, law, offer, elsewhere)
-    if offer is None or p > ALPHA_FURTHER:
+    if offer is None or p > search_limits.ALPHA_FURTHER:
         return None
     new = fitted_curve(at.bench, offer, None)
     trial = _with(at, [*at.state.accepted, new], {new.term.key: p})

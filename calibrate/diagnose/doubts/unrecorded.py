@@ -13,28 +13,22 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from calibrate.diagnose.doubts.hidden_levers import TIME, Wish, wishes
+from calibrate.diagnose.doubts import limits
 from calibrate.diagnose.doubts.joint_scatter import (
     LOUDNESS,
     Innocent,
     innocent,
     spectrum,
 )
+from calibrate.diagnose.doubts.missing_columns import TIME, Wish, wishes
 from calibrate.diagnose.search.bench import Bench
+from calibrate.diagnose.search.null import Tail
 from calibrate.diagnose.search.port_process import lever
-from calibrate.diagnose.search.tail import Tail
 from calibrate.model.effects.ports import Place, Port
 from calibrate.model.effects.term import Missing
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
-
-DRAWS = 200
-ALPHA = 0.005  # family-wise over all ports: joints that repeat unequally well are innocent, too, and not quite drawn
-RESTLESS = 12.0  # 2 ln L by which some samples have to scatter through all joints, others not (two numbers)
-FEWEST = 30  # observations
-# 2 ln L within which ports are not separated: the simplest is reported, one whose column is known to be missing first.
-ALIKE = 6.0
 
 
 @dataclass(frozen=True)
@@ -55,14 +49,18 @@ def unrecorded(bench: Bench, rng: Generator, missing: Sequence[Missing] = ()) ->
     if not blocks or not asked:
         return None
     residual = _leverage_corrected(bench)
-    seen, null, restless = np.zeros((len(asked), len(LOUDNESS))), np.zeros((len(asked), len(LOUDNESS), DRAWS)), 0.0
+    seen, null, restless = (
+        np.zeros((len(asked), len(LOUDNESS))),
+        np.zeros((len(asked), len(LOUDNESS), limits.SCATTER_DRAWS)),
+        0.0,
+    )
     for instrument, mine in blocks.items():
         unwhiten = _unwhitener(bench, instrument, mine)
         raw, levers = _turned(unwhiten, residual[mine]), [_felt(unwhiten, w, mine) for w in asked]
         base = _base(raw, asked, levers)
         restless += base.restless
         z = _turned(base.whitener, raw)
-        drawn = np.stack([z, *(z[rng.permutation(len(z))] for _ in range(DRAWS))])
+        drawn = np.stack([z, *(z[rng.permutation(len(z))] for _ in range(limits.SCATTER_DRAWS))])
         for i, lever_of in enumerate(levers):
             if asked[i].port.where == TIME:
                 continue
@@ -73,13 +71,13 @@ def unrecorded(bench: Bench, rng: Generator, missing: Sequence[Missing] = ()) ->
     best = seen.max(axis=1)
     p = Tail(null.max(axis=(0, 1))).p(float(best.max()))
     moving = next((w for w in asked if w.port.where == TIME), None)
-    if moving is not None and restless > max(RESTLESS, float(best.max()) if p <= ALPHA else 0.0):
+    if moving is not None and restless > max(limits.RESTLESS, float(best.max()) if p <= limits.SCATTER_ALPHA else 0.0):
         return Unrecorded(moving.port, restless, float(np.exp(-restless / 2.0)), 0.5, moving.missing)
-    if best.max() <= 0.0 or p > ALPHA:
+    if best.max() <= 0.0 or p > limits.SCATTER_ALPHA:
         return None
     at = _said(asked, best)
     loud = LOUDNESS[int(np.argmax(seen[at]))]
-    near = [w for w, gain in zip(asked, best, strict=True) if gain >= best.max() - ALIKE]
+    near = [w for w, gain in zip(asked, best, strict=True) if gain >= best.max() - limits.PORTS_TIED]
     lacking = tuple(dict.fromkeys(m for w in near for m in w.missing))
     return Unrecorded(asked[at].port, float(best[at]), p, loud / (1.0 + loud), lacking)
 
@@ -98,13 +96,13 @@ def _base(raw: Floats, asked: Sequence[Wish], levers: Sequence[Floats]) -> Innoc
         if w.port.where != TIME
     ]
     alone = max(float(_gains(one, z[None]).max()) for one in felt)
-    return plain if plain.two_log_likelihood + alone > through.two_log_likelihood + ALIKE else through
+    return plain if plain.two_log_likelihood + alone > through.two_log_likelihood + limits.PORTS_TIED else through
 
 
 def _said(asked: Sequence[Wish], best: Floats) -> int:
     """The best of those whose column is missing, where it is as good as any."""
     known = np.array([best[i] if w.missing else -np.inf for i, w in enumerate(asked)])
-    return int(np.argmax(known if known.max() >= best.max() - ALIKE else best))
+    return int(np.argmax(known if known.max() >= best.max() - limits.PORTS_TIED else best))
 
 
 def _gains(felt: Floats, z: Floats) -> Floats:
@@ -151,6 +149,6 @@ def _blocks(bench: Bench) -> dict[int, Ints]:
     for instrument in np.unique(rows.instrument[rows.data]):
         mine = np.flatnonzero(rows.data & (rows.instrument == instrument))
         k = int(np.sum(rows.group[mine] == rows.group[mine[0]]))
-        if k * FEWEST <= len(mine):
+        if k * limits.SCATTER_OBSERVATIONS <= len(mine):
             out[int(instrument)] = mine.reshape(-1, k)
     return out

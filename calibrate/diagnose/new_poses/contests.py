@@ -7,17 +7,12 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
+from calibrate.diagnose import limits
 from calibrate.diagnose.doubts.diagnosis import Diagnosis, Named
-from calibrate.diagnose.doubts.drifts import parted_by_time
 from calibrate.diagnose.doubts.findings import named
+from calibrate.diagnose.doubts.missing_columns import separated_by_time
 from calibrate.diagnose.new_poses.longer_session import Elsewhere, NewPoses, elsewhere
-from calibrate.diagnose.new_poses.next_poses import (
-    COUNT,
-    Contest,
-    Duel,
-    next_poses,
-    reach_of,
-)
+from calibrate.diagnose.new_poses.next_poses import Contest, Duel, next_poses, reach_of
 from calibrate.diagnose.new_poses.reachable import reachable
 from calibrate.diagnose.search.bench import Bench
 from calibrate.diagnose.search.line_search import refined
@@ -27,8 +22,6 @@ from calibrate.model.effects.term import Accepted
 from calibrate.model.sensors import spots
 
 Floats = NDArray[np.float64]
-
-APART = 6.0  # of BIC: an alternative that all poses cannot drive farther off is no other cause but a richer one
 
 
 @dataclass(frozen=True)
@@ -42,7 +35,7 @@ class NextPoses:
     after: float  # and with these poses
 
 
-def separating(diagnosis: Diagnosis, rng: Generator, count: int = COUNT) -> NextPoses | None:
+def separating(diagnosis: Diagnosis, rng: Generator, count: int = limits.NEW_POSES) -> NextPoses | None:
     """The poses to take next; None where no finding has an alternative, or where no pose separates them."""
     state = diagnosis.model
     if not isinstance(state, Fitted):
@@ -54,7 +47,7 @@ def separating(diagnosis: Diagnosis, rng: Generator, count: int = COUNT) -> Next
     there, pairs, duels = elsewhere(state, offered), list[tuple[Named, Named]](), list[Duel]()
     for i, rival in rivals:
         found = duel(there, i, rival)
-        if found is not None and reach_of(found) > APART:
+        if found is not None and reach_of(found) > limits.SEPARABLE:
             duels.append(found)
             pairs.append((named(state.accepted[i].term), named(rival.term)))
     if not duels:
@@ -103,7 +96,7 @@ def _rivals(state: Fitted, diagnosis: Diagnosis) -> Sequence[tuple[int, Accepted
     for finding in diagnosis.findings:
         at = [i for i, a in enumerate(state.accepted) if named(a.term) == finding.name]
         for rival in finding.rivals if at else ():
-            if parted_by_time(finding.name, rival.name):
+            if separated_by_time(finding.name, rival.name):
                 continue
             found = rival_named(state, at[0], rival.name)
             if found is not None:

@@ -12,10 +12,10 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from calibrate.diagnose import limits
+
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
-
-COUNT = 20
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ class Chosen:
     separation: Floats  # (1 + count,) whitened squares: the BIC margin to expect, without any new pose first
 
 
-def next_poses(duels: Sequence[Duel], count: int = COUNT) -> Chosen:
+def next_poses(duels: Sequence[Duel], count: int = limits.NEW_POSES) -> Chosen:
     """From candidate poses, which are the same in all duels; every pose is taken once. ValueError without a duel."""
     standings = [_start(duel) for duel in duels]
     open_ = np.ones(len(duels[0].offered.finding), dtype=bool)

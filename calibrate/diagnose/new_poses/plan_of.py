@@ -7,14 +7,13 @@ from numpy.typing import NDArray
 
 from acquisition.recording.pose_plan import PlannedBlock, PlannedPose, PosePlan
 from acquisition.recording.samples import SEAT
+from calibrate.diagnose import limits
 from calibrate.diagnose.new_poses.contests import NextPoses
 from calibrate.diagnose.state.fitted import Fitted
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 Key = tuple[int | None, ...]  # placement, first_psd, seat
-
-LOADED_KG = 1e-3  # a payload of less is none
 
 
 def plan_of(found: NextPoses, state: Fitted) -> PosePlan:
@@ -34,7 +33,7 @@ def _block(found: NextPoses, mine: Ints, key: Floats) -> PlannedBlock:
         placement=placement,
         first_psd=1 if first == 1 else 2 if first == 2 else None,
         seat=seat,
-        payload_kg=float(key[3]) if key[3] > LOADED_KG else None,
+        payload_kg=float(key[3]) if key[3] > limits.LOADED_KG else None,
     )
 
 

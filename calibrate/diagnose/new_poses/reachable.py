@@ -9,6 +9,7 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
+from calibrate.diagnose import limits
 from calibrate.diagnose.new_poses.longer_session import NewPoses
 from calibrate.diagnose.state.fitted import Fitted
 from calibrate.model.arms.rig_arm import limits_of
@@ -18,22 +19,16 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 Bools = NDArray[np.bool_]
 
-OFFERED = 400
-TRIES = 3  # as many, since some never land
-SHARE_RECORDED = 0.25
-BETWEEN = (-0.5, 1.5)  # of the way from one recorded pose to another
-SPREAD_RAD = 0.1
 STEPS, STEP_RAD = 12, 0.3
 SINGULAR = 1e-4  # of the quickest direction
 LANDED_M = 1e-6
-ROOM_M = 0.05  # beyond the box in which the flange has been
 
 
-def reachable(state: Fitted, rng: Generator, count: int = OFFERED) -> NewPoses:
+def reachable(state: Fitted, rng: Generator, count: int = limits.OFFERED_POSES) -> NewPoses:
     """About `count` poses, from both sides of every joint at random."""
     q = state.session.samples.joints()
-    recorded = rng.integers(len(q), size=int(SHARE_RECORDED * count))
-    like = rng.integers(len(q), size=TRIES * count)
+    recorded = rng.integers(len(q), size=int(limits.RECORDED_SHARE * count))
+    like = rng.integers(len(q), size=limits.POSE_TRIES * count)
     near = _between(q, like, _place(state), rng)
     bound, landed = _landed(state, like, near, rng)
     free = rng.uniform(q.min(axis=0), q.max(axis=0), near.shape)
@@ -58,8 +53,8 @@ def _between(q: Floats, like: Ints, place: Ints, rng: Generator) -> Floats:
     for one in np.unique(place):
         mine = place[like] == one
         other[mine] = rng.choice(np.flatnonzero(place == one), int(mine.sum()))
-    share = rng.uniform(*BETWEEN, (len(like), 1))
-    return q[like] + share * (q[other] - q[like]) + rng.normal(0.0, SPREAD_RAD, (len(like), q.shape[1]))
+    share = rng.uniform(*limits.BETWEEN_POSES, (len(like), 1))
+    return q[like] + share * (q[other] - q[like]) + rng.normal(0.0, limits.SPREAD_RAD, (len(like), q.shape[1]))
 
 
 def _landed(state: Fitted, like: Ints, q_rad: Floats, rng: Generator) -> tuple[Bools, Floats]:
@@ -97,6 +92,6 @@ def _allowed(state: Fitted, q_rad: Floats) -> Bools:
     q = np.nan_to_num(q_rad)
     inside = np.all((q >= lower_rad) & (q <= upper_rad), axis=1)
     been, there = state.drivers.frames, arm.frames(theta, q)
-    low, high = been[:, -1, :3, 3].min(axis=0) - ROOM_M, been[:, -1, :3, 3].max(axis=0) + ROOM_M
+    low, high = been[:, -1, :3, 3].min(axis=0) - limits.ROOM_M, been[:, -1, :3, 3].max(axis=0) + limits.ROOM_M
     inside &= np.all((there[:, -1, :3, 3] >= low) & (there[:, -1, :3, 3] <= high), axis=1)
     return inside & (there[:, 1:, 2, 3].min(axis=1) >= been[:, 1:, 2, 3].min() - 1e-9)

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from acquisition.recording import Recording
 from acquisition.recording.rig import rig_sha256
+from calibrate.diagnose.doubts.detection_limits import Smallest, isolability, smallest_visible
 from calibrate.diagnose.doubts.diagnosis import (
     Diagnosis,
     Finding,
@@ -19,10 +20,8 @@ from calibrate.diagnose.doubts.diagnosis import (
     Verdict,
 )
 from calibrate.diagnose.doubts.findings import named
-from calibrate.diagnose.doubts.isolability import isolability
-from calibrate.diagnose.doubts.proof import Floor, HeldOut
-from calibrate.diagnose.doubts.smallest_visible import Smallest, smallest_visible
 from calibrate.diagnose.doubts.stated_noise import NoiseFound
+from calibrate.diagnose.doubts.unseen_rows import Floor, HeldOutProof
 from calibrate.diagnose.from_recording import Diagnosed, Physics
 from calibrate.diagnose.record.schema import (
     SCHEMA,
@@ -132,7 +131,7 @@ def _incomplete(one: Incomplete) -> IncompleteRecord:
     return IncompleteRecord(one.stage.value, one.reason)
 
 
-def _judged(said: Diagnosis) -> HeldOut | None:
+def _judged(said: Diagnosis) -> HeldOutProof | None:
     """Of the instrument with the most observations, on the first split that there is."""
     asked = [p for p in said.proofs if p.split == JUDGED] or list(said.proofs)
     return max(asked, key=lambda p: p.observations, default=None)
@@ -175,7 +174,7 @@ def _unexplained(found: Unexplained, rms_m: float | None) -> UnexplainedRecord:
     return UnexplainedRecord(found.where, ",".join(found.depends_on), size, found.share, found.p, found.why)
 
 
-def _split(proof: HeldOut) -> SplitRecord:
+def _split(proof: HeldOutProof) -> SplitRecord:
     low, high = proof.removed
     before_m, after_m = _number(proof.rms_before_m), _number(proof.rms_after_m)
     return SplitRecord(

@@ -7,6 +7,7 @@ from functools import cached_property, lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from calibrate.diagnose import limits
 from calibrate.diagnose.search.score import (
     Removed,
     Scores,
@@ -15,16 +16,7 @@ from calibrate.diagnose.search.score import (
     scores,
 )
 from calibrate.diagnose.state.linearised import State
-from calibrate.diagnose.state.visible import (
-    RANK,
-    VISIBLE,
-    Menu,
-    Sight,
-    beyond,
-    blind,
-    menu_of,
-    sight_of,
-)
+from calibrate.diagnose.state.visible import RANK, Menu, Sight, beyond, blind, menu_of, sight_of
 from calibrate.model.effects.curve import unit
 from calibrate.model.effects.term import Accepted, Term, at_joint
 
@@ -112,7 +104,7 @@ class Bench:
     def with_taken(self, proposed: Accepted) -> "Bench":
         """As if a term had been fitted: the linear part of a refit."""
         columns = self.state.columns(proposed.term, proposed.inner)
-        return Bench(self.state, beyond(self.menu, orthonormal(self.sight.complement(columns.T).T, VISIBLE)))
+        return Bench(self.state, beyond(self.menu, orthonormal(self.sight.complement(columns.T).T, limits.VISIBLE)))
 
     def menu_of(self, terms: tuple[Term, ...]) -> Menu:
         return menu_of(self.state, terms, self.sight)
@@ -126,7 +118,7 @@ class Bench:
         columns = self.state.columns(accepted.term, accepted.inner)
         size = np.linalg.norm(columns, axis=0)
         left = self.gone[i].span.T @ (columns / np.where(size > 0.0, size, 1.0))
-        return int(np.sum(np.linalg.eigvalsh(left.T @ left) > VISIBLE))
+        return int(np.sum(np.linalg.eigvalsh(left.T @ left) > limits.VISIBLE))
 
     def behind(self, accepted: Accepted) -> Floats:
         """(row,) an accepted term's contribution that geometry cannot absorb."""

@@ -1,33 +1,79 @@
-"""The next term: the best one that is significant, of a size that a machine could have, and confirmed by a refit."""
+"""The next term: the best one that is significant, of a size that a machine could have, and confirmed by a refit.
 
-from dataclasses import replace
+Candidates in the order of what they would explain with their inner values at their best.
+
+A grid of times or constants hides much of a candidate's worth once the noise of a model is small: compared by grids, a
+step that falls between two of them would never be the alternative of another step.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from itertools import islice
 
 import numpy as np
 
+from calibrate.diagnose import limits as shared_limits
+from calibrate.diagnose.search import limits
 from calibrate.diagnose.search.bench import Bench
+from calibrate.diagnose.search.line_search import refined, solved
 from calibrate.diagnose.search.null import Null, is_slow
-from calibrate.diagnose.search.proposals import Proposal, proposals
-from calibrate.diagnose.search.score import Removed, Scores, orthonormal
-from calibrate.diagnose.search.searching import (
-    ALPHA_DRIFT,
-    ALPHA_FIRST,
-    ALPHA_FURTHER,
-    FEW_DRAWS,
-    SURE,
-    SURE_SLOW,
-    Key,
-    Search,
-    cause_of,
-    null_at,
-)
-from calibrate.diagnose.state.visible import VISIBLE
+from calibrate.diagnose.search.score import Removed, Scores, bic_gain, orthonormal
+from calibrate.diagnose.search.searching import Key, Search, cause_of, null_at
 from calibrate.model.effects.term import Accepted, Term
 
-AT_ONCE = 4  # sure ones that are accepted before a refit
-PEERS = 8  # physics at a port that are looked at in turn for a plausible entry: ten thermometers are one growth
-LOOKED_AT = 32  # best entries, in all
-REFUSED = 6  # refits in a row that confirm no entry: nothing further can be told apart
+
+@dataclass(frozen=True, eq=False)
+class Proposal:
+    """One candidate, everything else linearly refitted."""
+
+    accepted: Accepted
+    entry: int  # of the menu: the best on the grid
+    gain: float  # of BIC
+
+    @property
+    def term(self) -> Term:
+        return self.accepted.term
+
+
+def proposals(
+    bench: Bench, found: Scores, without: Removed | None, least: float, barred: frozenset[Key]
+) -> Iterator[Proposal]:
+    """One of each key that is not barred, itself or by its cause, and gains more than `least`; the best first."""
+    coarse = _best_entries(bench, found, barred)
+    worth = limits.WORTH_REFINING * max(least, float(found.gain[coarse[0]]) if coarse else 0.0)
+    inner = [e for e in coarse if bench.menu.entries[e].inner.size and found.gain[e] > worth][: limits.REFINED]
+    ready = {entry: _proposal(bench, found, without, entry) for entry in inner}
+    gains = {entry: ready[entry].gain if entry in ready else float(found.gain[entry]) for entry in coarse}
+    for entry in sorted(coarse, key=lambda e: -round(gains[e], limits.EQUAL_DECIMALS)):
+        if gains[entry] <= least:
+            return
+        yield ready[entry] if entry in ready else _proposal(bench, found, without, entry)
+
+
+def _best_entries(bench: Bench, found: Scores, barred: frozenset[Key]) -> list[int]:
+    """The best entry of every key, best first; of equal ones the first of the catalogue."""
+    out: dict[Key, int] = {}
+    for entry in np.argsort(-np.round(found.gain, limits.EQUAL_DECIMALS), kind="stable"):
+        if found.gain[entry] <= 0.0:
+            break
+        term = bench.menu.terms[bench.menu.entries[entry].term]
+        if term.key not in barred and cause_of(term) not in barred:
+            out.setdefault(term.key, int(entry))
+    return list(out.values())
+
+
+def _proposal(bench: Bench, found: Scores, without: Removed | None, entry: int) -> Proposal:
+    chosen = bench.menu.entries[entry]
+    term = bench.menu.terms[chosen.term]
+    if not chosen.inner.size:
+        values, _ = solved(bench, term, chosen.inner, without)
+        return Proposal(Accepted(term, values, chosen.inner), entry, float(found.gain[entry]))
+    accepted = refined(bench, term, chosen.inner, without)
+    squares = solved(bench, term, accepted.inner, without)[1]
+    rss = bench.sight.rss + (without.squares if without is not None else 0.0)
+    numbers = int(found.rank[entry]) + chosen.inner.size
+    gain = float(bic_gain(np.array(squares), rss, np.array(numbers), bench.sight.data))
+    return Proposal(accepted, entry, max(gain, float(found.gain[entry])))
 
 
 def admissible(
@@ -35,12 +81,12 @@ def admissible(
 ) -> Proposal | None:
     """The best proposal above a gain that is not barred and of a size that a machine could have."""
     refused: set[tuple[str, str]] = set()
-    for proposal in islice(proposals(bench, found, without, least, barred), LOOKED_AT):
+    for proposal in islice(proposals(bench, found, without, least, barred), limits.LOOKED_AT):
         accepted = proposal.accepted
         if accepted.term.plausible(accepted.coefficients, accepted.inner, bench.noise_rad):
             return proposal
         refused.add((accepted.term.port.where, accepted.term.physics))
-        if len(refused) == PEERS:
+        if len(refused) == limits.PEERS:
             break
     return None
 
@@ -52,7 +98,7 @@ def grown(at: Search) -> Search | None:
     slow = at.bench.menu.of_terms(np.array([is_slow(t) for t in at.bench.menu.terms], dtype=bool))
     out = np.zeros(len(slow), dtype=bool)
     refused = 0
-    while refused < REFUSED:
+    while refused < limits.REFUSED:
         found = replace(at.bench.scores, gain=np.where(out, -np.inf, at.bench.scores.gain))
         proposed = admissible(at.bench, found, None, 0.0, barred)
         if proposed is None:
@@ -60,7 +106,7 @@ def grown(at: Search) -> Search | None:
         entry, coarse = proposed.entry, float(found.gain[proposed.entry])  # the null knows the grid, no finer values
         p = 0.0
         if coarse < _sure(proposed.term):
-            null = null_at(at.bench, at.rng, FEW_DRAWS) if null is None else null
+            null = null_at(at.bench, at.rng, limits.FEW_NULL_DRAWS) if null is None else null
             p = _p_of(at.bench, proposed, null, coarse)
         if p > _alpha(at, null, bool(slow[entry])):
             # The other family has its own null: a wander that hides a drift need not hide a harmonic.
@@ -78,28 +124,28 @@ def grown(at: Search) -> Search | None:
 def _p_of(bench: Bench, proposed: Proposal, null: Null, coarse: float) -> float:
     own = proposed.accepted
     columns = bench.sight.complement(bench.state.columns(own.term, own.inner).T).T
-    span = orthonormal(columns, VISIBLE).T
+    span = orthonormal(columns, shared_limits.VISIBLE).T
     return null.p(bench.sight, is_slow(own.term), coarse, span, len(span) + len(own.inner))
 
 
 def _alpha(at: Search, null: Null | None, slow: bool) -> float:
     """Where noise wanders, a drift has the whole 5 %: the null overstates the wander, and false drifts are rarer."""
     if at.state.accepted:
-        return ALPHA_FURTHER
-    return ALPHA_DRIFT if slow and null is not None and null.law.wanders else ALPHA_FIRST
+        return limits.ALPHA_FURTHER
+    return limits.ALPHA_DRIFT if slow and null is not None and null.law.wanders else limits.ALPHA_FIRST
 
 
 def _sure(term: Term) -> float:
-    return SURE_SLOW if is_slow(term) else SURE
+    return limits.SURE_SLOW if is_slow(term) else limits.SURE
 
 
 def _sure_ones(at: Search, first: Accepted, barred: frozenset[Key]) -> list[Accepted]:
     """The first, and what is certain beside it: one refit for several clear effects."""
     out, bench = [first], at.bench
-    while len(out) < AT_ONCE:
+    while len(out) < limits.AT_ONCE:
         bench = bench.with_taken(out[-1])
         barred = barred | {cause_of(out[-1].term)}
-        proposed = admissible(bench, bench.scores, None, SURE_SLOW, barred)
+        proposed = admissible(bench, bench.scores, None, limits.SURE_SLOW, barred)
         if proposed is None:
             break
         out.append(proposed.accepted)

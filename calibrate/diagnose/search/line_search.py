@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
+from calibrate.diagnose import limits
 from calibrate.diagnose.search.bench import Bench
 from calibrate.diagnose.search.score import Removed
-from calibrate.diagnose.state.visible import VISIBLE
 from calibrate.model.effects.term import Accepted, Inner, Term
 
 Floats = NDArray[np.float64]
@@ -56,9 +56,9 @@ def _solved(bench: Bench, term: Term, inner: Sequence[Floats], without: Removed 
         back = through(without.span)
         gram, along = gram + back @ np.swapaxes(back, 1, 2), along + back @ without.part[:, None]
     w, V = np.linalg.eigh(gram)
-    turned = np.where(w > VISIBLE, (np.swapaxes(V, 1, 2) @ along)[..., 0], 0.0)
-    found = (V @ (turned / np.maximum(w, VISIBLE))[..., None])[..., 0]
-    return found / size, np.sum(turned**2 / np.maximum(w, VISIBLE), axis=1)
+    turned = np.where(w > limits.VISIBLE, (np.swapaxes(V, 1, 2) @ along)[..., 0], 0.0)
+    found = (V @ (turned / np.maximum(w, limits.VISIBLE))[..., None])[..., 0]
+    return found / size, np.sum(turned**2 / np.maximum(w, limits.VISIBLE), axis=1)
 
 
 def _explains(

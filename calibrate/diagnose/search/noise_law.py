@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 from scipy.fft import dct
 from scipy.signal import lfilter
 
-from calibrate.diagnose.state.linearised import Rows
+from calibrate.diagnose.search import limits
+from calibrate.diagnose.state.linearised import WhitenedRows
 from calibrate.diagnose.state.visible import Sight
 from calibrate.fit.noise import NU
 
@@ -25,13 +26,6 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 
 PROBES = 24  # draws for the spectrum that geometry leaves of a wander
-FEWEST = 40  # observations of an instrument, for a wander to be found
-# -2 log L that wandering has to gain: 5 % of white sessions pass, and cost power only (two parameters, chi-square).
-WANDERS = 6.0
-# Wander is overstated rather than understated: the strongest within this -2 log L of the best.
-CONSERVATIVE = 1.0
-FEWEST_LENGTHS = 10  # observations of an instrument, for a law of their lengths
-LEVERAGE = 0.9  # rows that geometry follows closer than this show nothing about the noise
 
 # Correlation from one sample to the next; the last one is a random walk over any session.
 RHO = np.array([0.5, 0.7, 0.8, 0.9, 0.95, 0.98, 0.995])
@@ -85,7 +79,7 @@ class Series:
 class NoiseLaw:
     """How to draw noise like that of the session."""
 
-    rows: Rows
+    rows: WhitenedRows
     inflated: Floats  # (row,) residual, leverage corrected
     series: tuple[Series, ...]
 
@@ -138,7 +132,7 @@ class NoiseLaw:
         factor = np.ones((len(square), count))
         for one in np.unique(instrument):
             mine = np.flatnonzero((instrument == one) & (square > 0.0))
-            if len(mine) >= FEWEST_LENGTHS:
+            if len(mine) >= limits.FEWEST_FOR_LENGTHS:
                 factor[mine] = np.sqrt(_lengths(square[mine], (len(mine), count), rng) / square[mine, None])
         out = np.ones((len(self.rows.data), count))
         out[data] = factor[group]
@@ -155,7 +149,7 @@ def _lengths(square: Floats, shape: tuple[int, ...], rng: Generator) -> Floats:
     return rng.gamma(mean**2 / variance, variance / mean, shape)
 
 
-def curvature_of(rows: Rows) -> float:
+def curvature_of(rows: WhitenedRows) -> float:
     """Of the log likelihood over that of reweighted least squares at the same weights, below one for a t law.
 
     A step of the fit is longer than the least-squares step by its inverse. Hessian of the t law: Lange, Little, Taylor,
@@ -169,27 +163,27 @@ def curvature_of(rows: Rows) -> float:
     return float(np.sum(weight * k * (1.0 - 2.0 * square / (k * (NU + k)))) / np.sum(weight * k))
 
 
-def noise_law(rows: Rows, sight: Sight, t_s: Floats, rng: Generator) -> NoiseLaw:
+def noise_law(rows: WhitenedRows, sight: Sight, t_s: Floats, rng: Generator) -> NoiseLaw:
     """Of a state's rows; `t_s` (sample,) gives the order of capture."""
-    leverage = np.minimum(np.sum(sight.basis**2, axis=1), LEVERAGE)
+    leverage = np.minimum(np.sum(sight.basis**2, axis=1), limits.MOST_LEVERAGE)
     inflated = sight.residual / np.sqrt(1.0 - np.where(rows.data, leverage, 0.0))
     found = [_series(rows, sight, t_s, at, rng) for at in capture_orders(rows, t_s)]
     return NoiseLaw(rows, inflated, tuple(found))
 
 
-def capture_orders(rows: Rows, t_s: Floats) -> Sequence[Ints]:
+def capture_orders(rows: WhitenedRows, t_s: Floats) -> Sequence[Ints]:
     """(time, k) row numbers of every instrument with enough observations."""
     out: list[Ints] = []
     for instrument in np.unique(rows.instrument[rows.data]):
         mine = np.flatnonzero(rows.data & (rows.instrument == instrument))
         k = int(np.sum(rows.group[mine] == rows.group[mine[0]]))
         by_group = mine.reshape(-1, k)
-        if len(by_group) >= FEWEST:
+        if len(by_group) >= limits.FEWEST_FOR_WANDER:
             out.append(by_group[np.argsort(t_s[rows.sample[by_group[:, 0]]], kind="stable")])
     return out
 
 
-def _series(rows: Rows, sight: Sight, t_s: Floats, at: Ints, rng: Generator) -> Series:
+def _series(rows: WhitenedRows, sight: Sight, t_s: Floats, at: Ints, rng: Generator) -> Series:
     n, k = at.shape
     shape = (n, k, PROBES)
     levels = [_left(sight, at, rng.standard_normal(shape))]
@@ -215,9 +209,9 @@ def _left(sight: Sight, at: Ints, drawn: Floats) -> Floats:
 
 def _strongest(series: Series, residual: Floats) -> Wander:
     values = series.each(residual[:, None])[0]
-    if values[0] - np.min(values) < WANDERS:
+    if values[0] - np.min(values) < limits.WANDERS:
         return series.forms[0]
-    near = np.flatnonzero(values <= np.min(values) + CONSERVATIVE)
+    near = np.flatnonzero(values <= np.min(values) + limits.WANDER_CONSERVATIVE)
     slow = [series.forms[i].share / (1.0 - series.forms[i].rho) for i in near]
     return series.forms[near[int(np.argmax(slow))]]
 

@@ -3,6 +3,11 @@
 The maximum over all candidates is drawn, so the multiplicity of hundreds of correlated ones is paid (family-wise
 error). Source: Westfall, Young, Resampling-based multiple testing, 1993, ch. 2. Slow terms are a family of their own:
 where the noise wanders, theirs is the gain over a wander fitted to what remains, before and after.
+
+Small probabilities from a few hundred draws: the empirical share, beyond the largest ones a generalised-Pareto tail.
+
+Source: Knijnenburg, Wessels, Reinders, Shmulevich, Fewer permutations, more accurate P-values, Bioinformatics 25, 2009;
+moments of excesses: Hosking, Wallis, Technometrics 29(3), 1987.
 """
 
 from dataclasses import dataclass
@@ -10,7 +15,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
+from scipy.stats import genpareto
 
+from calibrate.diagnose.search import limits
 from calibrate.diagnose.search.noise_law import NoiseLaw
 from calibrate.diagnose.search.score import (
     Removed,
@@ -18,15 +25,36 @@ from calibrate.diagnose.search.score import (
     directions,
     turned_out,
 )
-from calibrate.diagnose.search.tail import Tail
 from calibrate.diagnose.state.visible import Menu, Sight
 from calibrate.model.effects.term import Term
 
 Floats = NDArray[np.float64]
-Bools = NDArray[np.bool_]
 
-DRAWS = 600
-FAMILIES = 2  # alpha is shared by fast and slow terms
+
+@dataclass(frozen=True)
+class Tail:
+    """Law of a maximum under the null, from draws (draw,) in any order."""
+
+    drawn: Floats
+
+    def p(self, value: float) -> float:
+        """Probability of at least this value."""
+        count, above = len(self.drawn), int(np.sum(self.drawn >= value))
+        tail = np.sort(self.drawn)[-max(limits.TAIL_ENOUGH, int(limits.TAIL_SHARE * count)) :]
+        if count == 0 or above >= limits.TAIL_ENOUGH or not np.all(np.isfinite([value, *tail])):
+            return (above + 1) / (count + 1)
+        threshold, excess = tail[0], tail[1:] - tail[0]
+        mean, variance = float(np.mean(excess)), float(np.var(excess))
+        if variance <= 0.0 or mean <= 0.0:
+            return (above + 1) / (count + 1)
+        # Bounded tails would claim p = 0 just beyond the largest draw: an exponential one is the shortest allowed.
+        shape = max(0.0, 0.5 * (1.0 - mean**2 / variance))
+        scale = mean * (1.0 - shape)
+        beyond = float(genpareto.sf(value - threshold, shape, scale=scale))
+        return max(limits.LEAST_P, len(excess) / count * beyond)
+
+
+Bools = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -42,7 +70,7 @@ class Null:
         geometry are span (k, row), `cost` parameters are paid for.
         """
         if not slow:
-            return min(1.0, FAMILIES * self.fast.p(gain))
+            return min(1.0, limits.FAMILIES * self.fast.p(gain))
         if self.law.wanders:
             left = sight.residual[:, None]
             after = left - span.T @ (span @ left)
@@ -62,11 +90,11 @@ class Null:
         else:
             squares = float(part @ part)
             gain = float(bic_gain(np.array(squares), sight.rss + squares, np.array(gone.cost), sight.data))
-        return self._of_slow(gain) if slow else min(1.0, FAMILIES * self.fast.p(gain))
+        return self._of_slow(gain) if slow else min(1.0, limits.FAMILIES * self.fast.p(gain))
 
     def _of_slow(self, gain: float) -> float:
         """Against a wander the price of the second family is not asked for again: the law overstates the wander."""
-        return min(1.0, (1 if self.law.wanders else FAMILIES) * self.slow.p(gain))
+        return min(1.0, (1 if self.law.wanders else limits.FAMILIES) * self.slow.p(gain))
 
 
 def is_slow(term: Term) -> bool:
@@ -74,7 +102,7 @@ def is_slow(term: Term) -> bool:
     return term.slow or any(name == "t" or name.startswith("temp_") for name in term.depends_on)
 
 
-def null_of(menu: Menu, law: NoiseLaw, rng: Generator, draws: int = DRAWS) -> Null:
+def null_of(menu: Menu, law: NoiseLaw, rng: Generator, draws: int = limits.NULL_DRAWS) -> Null:
     """Draws noise, lets geometry absorb its part and scores every entry of the menu."""
     noise = law.draw(rng, draws)
     left = noise - menu.sight.basis @ (menu.sight.basis.T @ noise)

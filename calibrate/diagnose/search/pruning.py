@@ -10,33 +10,21 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from calibrate.diagnose.search import limits
 from calibrate.diagnose.search.bench import Bench
 from calibrate.diagnose.search.null import Null, is_slow
 from calibrate.diagnose.search.score import gain_of
-from calibrate.diagnose.search.searching import (
-    ALPHA_FIRST,
-    ALPHA_FURTHER,
-    Search,
-    null_at,
-)
-
-COLLINEAR = 0.05  # share of a term that the others leave: less is not a term of its own
-COLLINEAR_COST = 6.0  # of BIC that dropping such a term may cost
-CANCELS = 0.1  # square of the sum of a port's terms over the sum of their squares: less, and they are surrogates
+from calibrate.diagnose.search.searching import Search, null_at
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
-
-TELLING = 5.0  # sigmas that the term would show between visits: with less, they show nothing
-HALF = 0.5  # of the term has to be there
-SIGMAS = 3.0
 
 
 def tidied(at: Search) -> Search:
     """Backward: without terms that cost more than they are worth, or that the others can nearly replace."""
     while at.state.accepted:
         worth = np.array([gain_of(gone, at.bench.sight) for gone in at.bench.gone])
-        allowed = np.where(at.bench.share < COLLINEAR, COLLINEAR_COST, 0.0)
+        allowed = np.where(at.bench.share < limits.COLLINEAR, limits.COLLINEAR_COST, 0.0)
         over = np.where(at.bench.plausible, worth - allowed, -np.inf)
         for i in (*surrogates(at.bench), *fading(at.bench)):
             over[i] = min(over[i], -1.0)
@@ -61,7 +49,7 @@ def balanced(bench: Bench) -> dict[str, list[int]]:
     return {
         where: at
         for where, at in mine.items()
-        if len(at) > 1 and np.sum(felt[at].sum(axis=0) ** 2) < CANCELS * np.sum(felt[at] ** 2)
+        if len(at) > 1 and np.sum(felt[at].sum(axis=0) ** 2) < limits.CANCELS * np.sum(felt[at] ** 2)
     }
 
 
@@ -89,7 +77,7 @@ def confirmed(at: Search) -> Search:
         at = replace(at, p=p)
         values = np.array([p[a.term.key] for a in at.state.accepted])
         worst = int(np.argmax(values))
-        if values[worst] <= (ALPHA_FURTHER if len(values) > 1 else ALPHA_FIRST):
+        if values[worst] <= (limits.ALPHA_FURTHER if len(values) > 1 else limits.ALPHA_FIRST):
             return at
         at = without(at, worst)
     return at
@@ -115,10 +103,10 @@ def _fades(bench: Bench, i: int, visits: Ints) -> bool:
     amount = bench.contribution(bench.state.accepted[i])
     moved = _between(amount, visits)
     shown = float(np.linalg.norm(moved))
-    if shown < TELLING:
+    if shown < limits.REVISIT_SIGMAS:
         return False
     seen = float(moved @ _between(amount + bench.state.rows.residual, visits)) / shown**2
-    return seen + SIGMAS / shown < HALF
+    return seen + limits.REVISIT_CONFIDENCE / shown < limits.REVISIT_SHARE
 
 
 def _visits(bench: Bench) -> Ints:

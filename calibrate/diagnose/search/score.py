@@ -10,13 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from calibrate.diagnose import limits
 from calibrate.diagnose.state.linearised import State
-from calibrate.diagnose.state.visible import (
-    VISIBLE,
-    Block,
-    Menu,
-    Sight,
-)
+from calibrate.diagnose.state.visible import EntryBlock, Menu, Sight
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
@@ -88,7 +84,7 @@ def scores(menu: Menu, without: Removed | None = None) -> Scores:
     return Scores(np.where(rank > 0, gain, -np.inf), rank, squares)
 
 
-def projected(block: Block, sight: Sight, without: Removed | None) -> tuple[Floats, Floats]:
+def projected(block: EntryBlock, sight: Sight, without: Removed | None) -> tuple[Floats, Floats]:
     """Gram matrices (entry, k, k) and products with the residual (entry, k) in the model without some terms."""
     if without is None:
         return block.gram, block.along
@@ -101,7 +97,7 @@ def coefficients(menu: Menu, entry: int, without: Removed | None = None) -> Floa
     one = _alone(menu, entry)
     gram, along = projected(one, menu.sight, without)
     w, V = np.linalg.eigh(gram[0])
-    inverse = np.where(w > VISIBLE, 1.0 / np.maximum(w, VISIBLE), 0.0)
+    inverse = np.where(w > limits.VISIBLE, 1.0 / np.maximum(w, limits.VISIBLE), 0.0)
     size = one.size[0]
     return (V * inverse) @ (V.T @ along[0]) / np.where(size > 0.0, size, 1.0)
 
@@ -111,24 +107,24 @@ def _explained(gram: Floats, along: Floats, numbers: Floats, rss: float, data: i
     k = along.shape[1]
     own = np.einsum("ekk->ek", gram)
     if k == 1:
-        seen = own[:, 0] > VISIBLE
+        seen = own[:, 0] > limits.VISIBLE
         return np.where(seen, along[:, 0] ** 2 / np.where(seen, own[:, 0], 1.0), 0.0), seen.astype(np.intp)
     solved = np.linalg.solve(gram + RIDGE * np.eye(k), along[..., None])[..., 0]
     squares = np.minimum(np.einsum("ek,ek->e", along, solved), rss)
-    rank = np.any(own > VISIBLE, axis=1).astype(np.intp)
+    rank = np.any(own > limits.VISIBLE, axis=1).astype(np.intp)
     near = np.flatnonzero(bic_gain(squares, rss, rank + numbers, data) > 0.0)
     w, V = np.linalg.eigh(gram[near])
     turned = np.einsum("ekl,ek->el", V, along[near])
-    seen = w > VISIBLE
+    seen = w > limits.VISIBLE
     squares[near] = np.sum(np.where(seen, turned**2 / np.where(seen, w, 1.0), 0.0), axis=1)
     rank[near] = seen.sum(axis=1)
     return squares, rank
 
 
-def turned_out(block: Block) -> Floats:
+def turned_out(block: EntryBlock) -> Floats:
     """(entry, k, k) what makes orthonormal rows of every entry's columns behind geometry; zero where nothing shows."""
     w, V = np.linalg.eigh(block.gram)
-    turn = V * np.where(w > VISIBLE, 1.0 / np.sqrt(np.maximum(w, VISIBLE)), 0.0)[:, None, :]
+    turn = V * np.where(w > limits.VISIBLE, 1.0 / np.sqrt(np.maximum(w, limits.VISIBLE)), 0.0)[:, None, :]
     return np.swapaxes(turn, 1, 2)
 
 
@@ -139,7 +135,9 @@ def directions(menu: Menu, entry: int) -> Floats:
     return turn[np.any(turn != 0.0, axis=1)] @ menu.sight.complement(one.raw[0])
 
 
-def _alone(menu: Menu, entry: int) -> Block:
+def _alone(menu: Menu, entry: int) -> EntryBlock:
     block = next(b for b in menu.blocks if entry in b.entries)
     at = np.flatnonzero(block.entries == entry)
-    return Block(block.entries[at], block.size[at], block.raw[at], block.absorbed[at], block.along[at], block.gram[at])
+    return EntryBlock(
+        block.entries[at], block.size[at], block.raw[at], block.absorbed[at], block.along[at], block.gram[at]
+    )

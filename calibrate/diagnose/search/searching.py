@@ -6,9 +6,10 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.random import Generator
 
+from calibrate.diagnose.search import limits
 from calibrate.diagnose.search.bench import Bench
 from calibrate.diagnose.search.noise_law import noise_law
-from calibrate.diagnose.search.null import DRAWS, Null, null_of
+from calibrate.diagnose.search.null import Null, null_of
 from calibrate.diagnose.state.linearised import State
 from calibrate.model.effects.curve import SmoothCurve
 from calibrate.model.effects.ports import Place
@@ -17,14 +18,6 @@ from calibrate.model.effects.term import Form, Shape, Term
 
 Key = tuple[object, ...]
 
-ALPHA_FIRST = 0.03  # of 5 % for a whole diagnosis: the rest is for what has no name
-ALPHA_DRIFT = 0.05  # of the first term against noise that wanders
-ALPHA_FURTHER = 0.01
-# Of BIC: accepted for now without drawing a null; the last check draws one for all. Slow ones face a wander, too.
-SURE, SURE_SLOW = 60.0, 150.0
-FEW_DRAWS = 200  # of a null on the way; the last one has more
-BETTER = 0.5  # of BIC, for an exchange
-HELD = 2  # harmonics of a turn that a smooth curve over a part of it can be
 SMOOTH = (Shape.LINEAR, Shape.QUADRATIC, Shape.CUBIC, Shape.HARMONIC)  # a step, a sign or a decay is no smooth curve
 PLACE = "place"  # what variants that name one begin with
 
@@ -70,7 +63,7 @@ def holds(curve: Term, term: Term) -> bool:
     """
     if not isinstance(curve, SmoothCurve) or not set(term.depends_on) <= set(curve.depends_on):
         return False
-    slow = term.shape in SMOOTH and (term.order or 1) <= HELD
+    slow = term.shape in SMOOTH and (term.order or 1) <= limits.HELD_HARMONICS
     return slow and curve.port == term.port and _within(curve, term)
 
 
@@ -92,7 +85,7 @@ def cause_of(term: Term) -> Key:
     return (*term.key[:-1], kept)
 
 
-def null_at(bench: Bench, rng: Generator, draws: int = DRAWS) -> Null:
+def null_at(bench: Bench, rng: Generator, draws: int = limits.NULL_DRAWS) -> Null:
     """Null of a state, from its own residual."""
     law = noise_law(bench.state.rows, bench.sight, bench.state.drivers.t_s, rng)
     return null_of(bench.menu, law, rng, draws)

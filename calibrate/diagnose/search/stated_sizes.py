@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from calibrate.diagnose.search import limits
 from calibrate.diagnose.search.bench import Bench
 from calibrate.diagnose.search.line_search import telling_times
 from calibrate.diagnose.search.noise_law import curvature_of
@@ -15,9 +16,6 @@ from calibrate.model.effects.term import Accepted, Form, Size, Term
 
 Floats = NDArray[np.float64]
 
-LEVERAGE = 0.9  # rows that the model follows closer show nothing about the noise
-TOLD = 1e-10  # of the largest eigenvalue of unit columns: combinations below are not determined by the data
-PART = 1e-3  # of a value in such a combination, for the value itself not to be reported
 INNER_STEP = 1e-3  # of the range of an inner parameter, for its difference quotient
 WEIGHT = ("gravity_torque", "overturning_moment", "payload")  # drivers that follow from masses
 
@@ -54,17 +52,17 @@ def sandwich(bench: Bench, columns: Floats) -> Floats:
     rows, data = bench.state.rows, bench.state.rows.data
     size = np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
     unit = columns / size
-    leverage = np.minimum(np.sum(bench.sight.basis**2, axis=1), LEVERAGE)
+    leverage = np.minimum(np.sum(bench.sight.basis**2, axis=1), limits.MOST_LEVERAGE)
     met = unit * (bench.sight.residual / np.sqrt(1.0 - leverage))[:, None]
     _, group = np.unique(rows.group[data], return_inverse=True)
     each = np.zeros((int(group.max()) + 1, columns.shape[1]))
     np.add.at(each, group, met[data])
     w, V = np.linalg.eigh(unit.T @ unit * curvature_of(rows))
-    told = w > TOLD * max(float(w.max(initial=0.0)), 1e-300)
+    told = w > limits.DETERMINED * max(float(w.max(initial=0.0)), 1e-300)
     inverse = (V[:, told] / w[told]) @ V[:, told].T
     found = inverse @ (each.T @ each + unit[~data].T @ unit[~data]) @ inverse
     covariance = np.asarray(found / np.outer(size, size), dtype=np.float64)
-    untold = np.any(np.abs(V[:, ~told]) > PART, axis=1)
+    untold = np.any(np.abs(V[:, ~told]) > limits.PART_OF_UNDETERMINED, axis=1)
     covariance[untold, untold] = np.inf
     return covariance
 

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.recording import Samples
+from calibrate.diagnose import limits
 from calibrate.model.effects.drivers import Drivers
 from calibrate.model.effects.term import Size, Term
 
@@ -16,7 +17,6 @@ Ints = NDArray[np.intp]
 # Of the largest variance, in plausible sizes: below, a file of double precision cannot separate it from rounding. It is
 # then taken as larger than it is.
 ROUNDING = 1e-14
-UNSEEN = 0.1  # sigmas of the data for a whole unit
 RANK = 1e-10  # of the largest singular value of scaled columns
 
 
@@ -56,7 +56,7 @@ class Assumed:
         _, known, Vt = np.linalg.svd(
             np.concatenate([seen @ weak.T, np.zeros((len(weak), len(weak)))]), full_matrices=False
         )
-        return replace(self, root=np.concatenate([self.root, Vt[known < UNSEEN] @ weak / unit]))
+        return replace(self, root=np.concatenate([self.root, Vt[known < limits.UNSEEN_ASSUMED] @ weak / unit]))
 
     def residual(self, values: Floats) -> Floats:
         """(row,)"""

@@ -12,10 +12,11 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from calibrate.diagnose import limits
 from calibrate.diagnose.state.assumed import Assumed
 from calibrate.diagnose.state.effect_problem import EffectProblem, plain_sizes
 from calibrate.diagnose.state.in_sight import in_sight, solve_in_sight
-from calibrate.diagnose.state.linearised import Rows, Unseen
+from calibrate.diagnose.state.linearised import UnseenRows, WhitenedRows
 from calibrate.diagnose.state.noise_of_fit import (
     Noise,
     covariance_at,
@@ -52,17 +53,7 @@ from calibrate.model.with_effects.driver_values import as_before
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 
-TURNS = 40  # of weights and least squares; most settle in 5 to 8
-FEWEST_TURNS = 4
-REFRESHED = 2  # turns after which drivers have settled: what a nanometre changes in them decides nothing
-STEPS = 12  # of a solver in a turn: the next one goes on from there
-TOLERANCE = 0.02  # of chi2 in a turn: less than what settles the likelihood
-LAST = 1e-3  # the same in the turn that ends a fit, 3 % of a sigma
 DAMPING = 1e-9  # of the first step: along what the data see it is a Gauss-Newton step
-WILD = 0.1  # weight of a row that may have bent a plain fit
-SWALLOWED = 0.3  # weight of a row that next to nothing of a model follows: five sigmas off
-SETTLED = 0.1  # of -2 log L: far below any difference that decides
-CREEPING = SETTLED / TURNS  # the same in a turn: as many as there are would not bring it beyond that
 AT_REST = (Stop.GAIN, Stop.ROUNDING)  # of a solver that found the least squares of its weights
 PLACES = ("placement", seat.POINTS, point_line.POINTS)  # of where something stood; a place may be met unseen
 
@@ -110,7 +101,7 @@ class Fitted:
 
     @property
     def distrusted(self) -> int:
-        return sum(int(np.sum(s.weights < SWALLOWED)) for s in self.scatters)
+        return sum(int(np.sum(s.weights < limits.DISTRUSTED_WEIGHT)) for s in self.scatters)
 
     def trusting(self) -> "Fitted":
         noise = self.noise.trusted
@@ -146,11 +137,11 @@ class Fitted:
         return kept if kept is not None and kept.drivers is self.drivers else Listed(self.drivers)
 
     @property
-    def rows(self) -> Rows:
+    def rows(self) -> WhitenedRows:
         return self._rows
 
     @cached_property
-    def _rows(self) -> Rows:
+    def _rows(self) -> WhitenedRows:
         parameters = self.problem.parameters
         free = np.flatnonzero([p.free for p in parameters])
         believed = free[np.isfinite(priors(parameters)[free])]
@@ -167,7 +158,9 @@ class Fitted:
         none = np.full(known + len(believed), -1, dtype=np.intp)
         labels = [np.concatenate([x, none]) for x in self._labels]
         stated = len(self._labels[0]) + blocks + np.arange(assumed)
-        return Rows(residual, np.concatenate([slope, beliefs]), *labels, owner=self.problem.owner[free], stated=stated)
+        return WhitenedRows(
+            residual, np.concatenate([slope, beliefs]), *labels, owner=self.problem.owner[free], stated=stated
+        )
 
     @cached_property
     def _labels(self) -> tuple[Ints, Ints, Ints]:
@@ -265,18 +258,18 @@ class Fitted:
     def select(self, samples: Ints) -> "Fitted":
         return _cut(self, np.sort(samples))
 
-    def held_out(self, samples: Ints) -> tuple[Unseen, ...]:
+    def held_out(self, samples: Ints) -> tuple[UnseenRows, ...]:
         rows = _rows_of(self.session, np.sort(samples))
         moved = places_found(self.problem, self.values, self.scatters, rows, len(self._labels[0]))
         at = self.problem.around(moved)
         misfits = [m.problem.observed - e for m, e in zip(self.session.measured, at.expected, strict=True)]
         apart = misfits if self.noise.shared is None else self.noise.shared.apart(misfits)
-        out: list[Unseen] = []
+        out: list[UnseenRows] = []
         for i, (m, r) in enumerate(zip(self.session.measured, rows, strict=True)):
             if len(r) == 0 or len(self.problem.rows[i]) == 0:  # without a row in the fit its noise is unknown
                 continue
             W = whitener_of(covariance_at(self.scatters[i], self.problem.rows[i], r))
-            out.append(Unseen(m.name, m.sample_rows[r, -1], misfits[i][r], np.einsum("nij,nj->ni", W, apart[i][r])))
+            out.append(UnseenRows(m.name, m.sample_rows[r, -1], misfits[i][r], np.einsum("nij,nj->ni", W, apart[i][r])))
         return tuple(out)
 
     def _refitted(self, accepted: tuple[Accepted, ...], noise: Noise) -> "Fitted":
@@ -302,9 +295,11 @@ def fit_geometry(session: Session, active: Ints | None = None) -> Fitted:
     fits: list[Fitted] = []
     for loss in (Loss.SQUARE, Loss.HUBER):
         seen = in_sight(problem, session.start)
-        rough = solve_in_sight(problem, session.start, seen, damping=FAR_START, tolerance=TOLERANCE, loss=loss)
+        rough = solve_in_sight(
+            problem, session.start, seen, damping=FAR_START, tolerance=limits.TURN_TOLERANCE, loss=loss
+        )
         fits.append(_settled(_turn(problem, chosen, rough.theta, noise_of(problem, rough))))
-        if all(np.all(s.weights > WILD) for s in fits[0].scatters):
+        if all(np.all(s.weights > limits.UNTRUSTED_WEIGHT) for s in fits[0].scatters):
             break
     return min(fits, key=lambda fit: fit.minus_two_log_likelihood)
 
@@ -345,28 +340,36 @@ def _settled(fitted: Fitted, renewing: bool = False) -> Fitted:
     every turn predicts them, the last one as good as its own, which a likelier turn under others would not be.
     """
     best, resting = fitted, False
-    for turn in range(1, TURNS):
+    for turn in range(1, limits.FIT_TURNS):
         last, problem = fitted, fitted.problem
-        anew = resting or turn + 1 == FEWEST_TURNS
+        anew = resting or turn + 1 == limits.FEWEST_TURNS
         problem = problem.forgetting() if anew else problem
-        if fitted.problem.terms and (renewing or turn <= REFRESHED):
+        if fitted.problem.terms and (renewing or turn <= limits.REFRESHED_TURNS):
             problem = problem.refreshed(last.predicted if renewing else last.drivers)
-        new = _turn(problem, fitted.active, fitted.values, fitted.noise, LAST if anew else TOLERANCE)
+        new = _turn(
+            problem,
+            fitted.active,
+            fitted.values,
+            fitted.noise,
+            limits.LAST_TOLERANCE if anew else limits.TURN_TOLERANCE,
+        )
         fitted = replace(new, steps=fitted.steps + new.steps)
         best = fitted if renewing else min(best, fitted, key=lambda fit: fit.minus_two_log_likelihood)
         gained = last.minus_two_log_likelihood - fitted.minus_two_log_likelihood
-        least = SETTLED if new.stop in AT_REST else CREEPING
-        resting = turn + 1 >= FEWEST_TURNS and abs(gained) < least
+        least = limits.SETTLED if new.stop in AT_REST else limits.CREEPING
+        resting = turn + 1 >= limits.FEWEST_TURNS and abs(gained) < least
         if resting and anew:
             return replace(best, steps=fitted.steps, stop=Stop.LIKELIHOOD if new.stop in AT_REST else Stop.ROUNDS)
     return replace(best, steps=fitted.steps, stop=Stop.ROUNDS)
 
 
-def _turn(problem: EffectProblem, active: Ints, start: Floats, noise: Noise, tolerance: float = TOLERANCE) -> Fitted:
+def _turn(
+    problem: EffectProblem, active: Ints, start: Floats, noise: Noise, tolerance: float = limits.TURN_TOLERANCE
+) -> Fitted:
     """Least squares under the noise so far, along what the data see, then the noise that is left."""
     problem = noise.under(problem)
     seen = in_sight(problem, start)
-    fit = solve_in_sight(problem, start, seen, damping=DAMPING, max_steps=STEPS, tolerance=tolerance)
+    fit = solve_in_sight(problem, start, seen, damping=DAMPING, max_steps=limits.SOLVER_STEPS, tolerance=tolerance)
     noise = noise_of(problem, fit)
     return Fitted(problem.session, active, problem, fit.theta, noise, fit.covariance, fit.steps, fit.stop)
 

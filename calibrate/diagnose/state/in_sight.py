@@ -15,8 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from calibrate.diagnose import limits
 from calibrate.diagnose.state.effect_problem import EffectProblem
-from calibrate.diagnose.state.visible import VISIBLE
 from calibrate.fit.solvers import Fit, Loss, covariance_of, solve, triangle_of
 from calibrate.model.parameters import (
     Parameter,
@@ -30,7 +30,6 @@ Ints = NDArray[np.intp]
 Bools = NDArray[np.bool_]
 
 DEPENDENT = 1e-9  # of a unit column: what is left below is rounding
-UNSEEN = 1.0  # a direction that the data know no better than what is to be expected stays (docs/mathematics.md, 5)
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +74,7 @@ def _of_geometry(rows: Floats, mine: Ints, values: int) -> Floats:
     """(value, move); prior rows stand below those of the data."""
     data = rows[: len(rows) - values, mine]
     _, s, Vt = np.linalg.svd(data, full_matrices=False)
-    kept = s > UNSEEN
+    kept = s > limits.UNSEEN
     out = np.zeros((values, int(kept.sum())))
     out[mine] = Vt[kept].T
     return out
@@ -103,7 +102,7 @@ def _of_term(rows: Floats, mine: Ints, basis: Floats, values: int) -> tuple[Floa
     column = data / np.where(size > 0.0, size, 1.0)
     seen = column - basis @ (basis.T @ column)
     w, V = np.linalg.eigh(seen.T @ seen)
-    kept = w > VISIBLE
+    kept = w > limits.VISIBLE
     out = np.zeros((values, int(kept.sum())))
     out[mine] = V[:, kept] * (size.max(initial=0.0) / np.where(size > 0.0, size, 1.0))[:, None]
     return out, seen @ V[:, kept]

@@ -10,6 +10,7 @@ from typing import Protocol, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from calibrate.diagnose import limits
 from calibrate.fit.noise import sigma_about_zero
 from calibrate.model.effects.drivers import Drivers
 from calibrate.model.effects.term import Accepted, Term
@@ -17,11 +18,9 @@ from calibrate.model.effects.term import Accepted, Term
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 
-WILD = 6.0  # sigmas
-
 
 @dataclass(frozen=True)
-class Rows:
+class WhitenedRows:
     """Whitened rows: first those of the data, then one for every prior. Unit noise where the model holds."""
 
     residual: Floats  # (row,) observed minus expected, robust weights included
@@ -38,7 +37,7 @@ class Rows:
 
 
 @dataclass(frozen=True)
-class Unseen:
+class UnseenRows:
     """One instrument's observations that the fit has not seen."""
 
     instrument: str
@@ -52,7 +51,7 @@ def tame(misfit: Floats, least: float) -> NDArray[np.bool_]:
     is to blame for. Where each would be wild, the spread shows nothing, and none is.
     """
     spread = max(float(sigma_about_zero(misfit)), least)
-    near = np.max(np.abs(misfit), axis=1) <= WILD * spread
+    near = np.max(np.abs(misfit), axis=1) <= limits.OUTLYING_SIGMAS * spread
     return near | ~np.any(near)
 
 
@@ -63,7 +62,7 @@ class State(Protocol):
     def accepted(self) -> tuple[Accepted, ...]: ...
 
     @property
-    def rows(self) -> Rows:
+    def rows(self) -> WhitenedRows:
         """Linearised at this state; `geometry` holds geometry and the coefficients and inner values of `accepted`."""
         ...
 
@@ -111,7 +110,7 @@ class State(Protocol):
         """The same model over some of the samples, not refitted."""
         ...
 
-    def held_out(self, samples: Ints) -> tuple["Unseen", ...]:
+    def held_out(self, samples: Ints) -> tuple["UnseenRows", ...]:
         """What this state, fitted on other samples, predicts of these. Where a place or seat occurs in these samples
         only, its own frame or point is found from them first, everything else being held.
         """

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from calibrate.diagnose import limits
 from calibrate.diagnose.state.effect_problem import EffectProblem
 from calibrate.fit.identify.session import assumed_sigma
 from calibrate.fit.noise import Scatter, SharedScatter, levers_of, likelihood_of, scatter_of, shares_found, witness_of
@@ -14,9 +15,6 @@ from calibrate.model.problem import whitener_of
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
-
-MOST_FITTED = 0.2  # of the rows that are left over, at least, when noise is judged
-GLITCH = 0.3  # weight of a reading of the second encoders from which on it counts less than fully: five sigmas off
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +73,7 @@ def noise_of(problem: EffectProblem, fit: Fit) -> Noise:
 def _trust(seen: Scatter, residual: Floats, known: Ints) -> Floats:
     """(row,) of all readings of the second encoders, active or not."""
     _, weights = likelihood_of(residual, covariance_at(seen, known, np.arange(len(residual))))
-    return np.clip(weights / GLITCH, 0.0, 1.0)
+    return np.clip(weights / limits.GLITCH_WEIGHT, 0.0, 1.0)
 
 
 def freedom(problem: EffectProblem, values: Floats, covariance: Floats) -> Floats:
@@ -94,7 +92,7 @@ def freedom(problem: EffectProblem, values: Floats, covariance: Floats) -> Float
         count = len(rows) * measured.problem.observed.shape[1]
         mine = slope[first : first + count]
         fitted = float(np.sum((mine @ posterior) * mine))
-        out[i] = count / max(count - fitted, MOST_FITTED * count) if count else 1.0
+        out[i] = count / max(count - fitted, limits.MOST_FITTED * count) if count else 1.0
         first += count
     return out
 

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from acquisition.recording import Samples
 from acquisition.recording.rig import Rig, Tolerance
+from calibrate.diagnose import limits
 from calibrate.fit.instruments import instruments_of
 from calibrate.fit.weighting import Weighting
 from calibrate.model.arms.catalogue import arm_of
@@ -32,8 +33,6 @@ from calibrate.model.with_effects.driver_values import readout_at
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
-
-GAUGE = 30.0  # plausible sizes: prior of a parameter about which nobody has an opinion
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,7 +97,7 @@ def _doubted(rig: Rig, belief: LinkTolerance | None) -> Rig:
 
 
 def _believed(p: Parameter) -> Parameter:
-    return p if not p.free or np.isfinite(p.prior) else replace(p, prior=GAUGE * p.plausible)
+    return p if not p.free or np.isfinite(p.prior) else replace(p, prior=limits.GAUGE * p.plausible)
 
 
 def drivers_of(session: Session, frames: Floats, expected: Mapping[str, Floats], own: Mapping[str, Floats]) -> Drivers:

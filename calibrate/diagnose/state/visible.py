@@ -12,15 +12,14 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from calibrate.diagnose.state.linearised import Rows, State
+from calibrate.diagnose import limits
+from calibrate.diagnose.state.linearised import State, WhitenedRows
 from calibrate.model.effects.term import Term
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 K = TypeVar("K")
 
-VISIBLE = 1e-5  # share of a column's square; below it the poses do not show the effect
-BLIND = 2e-3  # of the largest lever of a joint: a millimetre or two, where other errors of the arm count as a turn
 RANK = 1e-10  # of the largest singular value of the scaled geometry
 
 
@@ -42,7 +41,7 @@ class Sight:
         return columns - (columns @ self.basis) @ self.basis.T
 
 
-def sight_of(rows: Rows) -> Sight:
+def sight_of(rows: WhitenedRows) -> Sight:
     """One singular value decomposition for a whole round of the search."""
     size = np.linalg.norm(rows.geometry, axis=0)
     U, s, Vt = np.linalg.svd(rows.geometry / np.where(size > 0.0, size, 1.0), full_matrices=False)
@@ -58,7 +57,7 @@ def blind(levers: Mapping[K, float]) -> tuple[K, ...]:
     Their lever is what errors elsewhere leave there: a size over it is no angle of the joint.
     """
     most = max(levers.values(), default=0.0)
-    return tuple(one for one, size in levers.items() if size < BLIND * most)
+    return tuple(one for one, size in levers.items() if size < limits.BLIND * most)
 
 
 @dataclass(frozen=True)
@@ -70,7 +69,7 @@ class Entry:
 
 
 @dataclass(frozen=True)
-class Block:
+class EntryBlock:
     """Entries with the same number of coefficients; columns have unit length before geometry is taken out.
 
     Columns on the complement are not kept: products with them follow from what geometry absorbs.
@@ -90,7 +89,7 @@ class Menu:
 
     terms: tuple[Term, ...]
     entries: tuple[Entry, ...]
-    blocks: tuple[Block, ...]
+    blocks: tuple[EntryBlock, ...]
     sight: Sight
 
     @cached_property
@@ -99,7 +98,7 @@ class Menu:
         shown = np.zeros(len(self.terms), dtype=bool)
         for block in self.blocks:
             share = np.max(np.diagonal(block.gram, axis1=1, axis2=2), axis=1)
-            for entry in block.entries[share > VISIBLE]:
+            for entry in block.entries[share > limits.VISIBLE]:
                 shown[self.entries[entry].term] = True
         return tuple(term for term, seen in zip(self.terms, shown, strict=True) if not seen)
 
@@ -155,7 +154,7 @@ def grid_of(term: Term) -> list[Floats]:
     return list(values)
 
 
-def _block(chosen: Ints, columns: list[Floats], sight: Sight) -> Block:
+def _block(chosen: Ints, columns: list[Floats], sight: Sight) -> EntryBlock:
     """Takes its columns out of the list: all candidates at once are most of what a diagnosis holds."""
     raw = np.empty((len(chosen), columns[chosen[0]].shape[1], columns[chosen[0]].shape[0]))
     for at, i in enumerate(chosen):
@@ -167,12 +166,12 @@ def _block(chosen: Ints, columns: list[Floats], sight: Sight) -> Block:
     absorbed = (flat @ sight.basis).reshape(*raw.shape[:2], -1)
     along = (flat @ sight.residual).reshape(raw.shape[:2])
     gram = raw @ np.swapaxes(raw, 1, 2) - absorbed @ np.swapaxes(absorbed, 1, 2)
-    return Block(chosen, size, raw, absorbed, along, gram)
+    return EntryBlock(chosen, size, raw, absorbed, along, gram)
 
 
-def _deflated(block: Block, span: Floats, part: Floats) -> Block:
+def _deflated(block: EntryBlock, span: Floats, part: Floats) -> EntryBlock:
     """`part` (k,) of the residual along the span."""
     more = (block.raw.reshape(-1, block.raw.shape[2]) @ span).reshape(*block.raw.shape[:2], -1)
     gram = block.gram - more @ np.swapaxes(more, 1, 2)
     absorbed = np.concatenate([block.absorbed, more], axis=2)
-    return Block(block.entries, block.size, block.raw, absorbed, block.along - more @ part, gram)
+    return EntryBlock(block.entries, block.size, block.raw, absorbed, block.along - more @ part, gram)

@@ -2,22 +2,20 @@
 
 from calibrate.diagnose.streams.clock import ClockFit, ClockStatus, clock_between
 from calibrate.diagnose.streams.examine import StreamReport
-from calibrate.diagnose.streams.finding import Outcome, StreamFinding
-from calibrate.diagnose.streams.from_recording import streams_of
-from calibrate.diagnose.streams.recorded import Device, devices_of
-from calibrate.diagnose.streams.sample_times import sample_windows
-from calibrate.diagnose.streams.to_file import with_streams
-from calibrate.diagnose.streams.track import Curve, Track, white_noise
+from calibrate.diagnose.streams.recorded import StreamDevice, devices_of
+from calibrate.diagnose.streams.stream_findings import StreamFinding
+from calibrate.diagnose.streams.streams_of_recording import sample_windows, streams_of, with_streams
+from calibrate.diagnose.streams.track import Outcome, Track, TrackCurve, white_noise
 
 __all__ = [
     "ClockFit",
     "ClockStatus",
-    "Curve",
-    "Device",
     "Outcome",
+    "StreamDevice",
     "StreamFinding",
     "StreamReport",
     "Track",
+    "TrackCurve",
     "clock_between",
     "devices_of",
     "sample_windows",

@@ -5,6 +5,18 @@
 Found by least squares on the curve of the reference (maximum likelihood of a delay: Knapp and Carter, IEEE ASSP 24,
 1976), each block with its own level and gain, so that zeros, slips and a model that is a little off do not count as
 time. Standing blocks show nothing about time and are left out.
+
+Least squares on streams with a sigma that neighbouring samples cannot make too small.
+
+Residuals of a stream hang together: noise is filtered, models are off a little for a while. So whole blocks of time
+are left out in turn (jackknife: Efron, SIAM CBMS 38, 1982, chapter 3; with clusters: MacKinnon, Nielsen, Webb, J.
+Applied Econometrics 38, 2023). Only blocks are taken as independent:
+
+    V = (B - 1) / B sum_b d_b d_b',  d_b = (H - H_b)^-1 X_b' psi(r_b),  H = X' psi'(r) X
+
+psi is Huber's: rows beyond its bend still pull, but do not hold, so they count in the pull and not in H (Huber 1981,
+section 7.6). Its scale is the usual residual of the rows that decide, those with much X: stamps that tremble make
+residuals grow with speed, and rows that hardly move would call every fast one wild.
 """
 
 from dataclasses import dataclass
@@ -14,20 +26,76 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from calibrate.diagnose.streams.clustered import fit
+from calibrate.diagnose.streams import limits
 from calibrate.diagnose.streams.coarse_clock import Ticks, coarse
-from calibrate.diagnose.streams.track import Curve, Track, white_noise
+from calibrate.diagnose.streams.track import SIGMA_OF_MEDIAN, Track, TrackCurve, white_noise
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 
-BLOCK_S = 0.5  # a motion of an arm from pose to pose; what is slower than this is level
-TOGETHER = 2  # blocks: errors of a reading that depend on the angle last as long as a motion does
+HUBER = 1.345  # sigmas: 95 % efficiency on normal noise (Huber 1981, section 4.5)
+SINGULAR = 1e-10  # of the scaled normal matrix: below, a combination is not seen
+
+
+@dataclass(frozen=True)
+class RobustLine:
+    """Solution of a linear fit; `covariance` NaN where the data do not determine it."""
+
+    values: Floats
+    covariance: Floats
+    blocks: int
+
+    @property
+    def sigma(self) -> Floats:
+        return np.sqrt(np.diag(self.covariance))
+
+
+def fit(X: Floats, y: Floats, block: Ints, rounds: int = 4) -> RobustLine | None:
+    """Robust y = X b. `X` (row, k), `y` (row,), `block` (row,). None where X is singular or blocks are too few."""
+    k, blocks = X.shape[1], len(np.unique(block))
+    scale = np.linalg.norm(X, axis=0)
+    if blocks <= k + 1 or not np.all(scale > 0.0):
+        return None
+    Z = X / scale
+    if np.linalg.eigvalsh(Z.T @ Z)[0] < SINGULAR:
+        return None
+    weight, holds, b = np.ones(len(y)), np.ones(len(y)), np.zeros(k)
+    deciding = np.sum(Z**2, axis=1)
+    for again in range(rounds):
+        if again:
+            residual = y - Z @ b
+            spread = SIGMA_OF_MEDIAN * _middle(np.abs(residual), deciding)
+            if spread <= 0.0:
+                break
+            weight = np.minimum(1.0, HUBER * spread / np.maximum(np.abs(residual), 1e-300))
+            holds = (weight == 1.0).astype(float)
+        normal = Z.T @ (weight[:, None] * Z)
+        b = np.linalg.solve(normal, Z.T @ (weight * y))
+    residual = y - Z @ b
+    covariance = _jackknife(Z, weight * residual, holds, block) / np.outer(scale, scale)
+    return RobustLine(b / scale, covariance, blocks)
+
+
+def _middle(values: Floats, weight: Floats) -> float:
+    """Weighted median."""
+    order = np.argsort(values)
+    passed = np.cumsum(weight[order])
+    return float(values[order[np.searchsorted(passed, 0.5 * passed[-1])]])
+
+
+def _jackknife(Z: Floats, pull: Floats, holds: Floats, block: Ints) -> Floats:
+    """Scatter of the solutions that leave one block out; blocks that hold much of the motion count in full."""
+    _, at = np.unique(block, return_inverse=True)
+    k, blocks = Z.shape[1], int(at.max()) + 1
+    sums, own = np.zeros((blocks, k)), np.zeros((blocks, k, k))
+    np.add.at(sums, at, Z * pull[:, None])
+    np.add.at(own, at, holds[:, None, None] * Z[:, :, None] * Z[:, None, :])
+    apart = np.linalg.solve(own.sum(axis=0) - own, sums[:, :, None])[:, :, 0]
+    return (blocks - 1) / blocks * apart.T @ apart
+
+
 ROUNDS = 12  # Gauss-Newton from a start within its reach needs five
 STILL_S = 1e-9  # step at which it has converged
-MOVES = 20.0  # times the noise that a block must move to show something about time
-FEWEST_BLOCKS = 5  # of those together
-USELESS_S = 1e-3  # a sigma beyond this is no answer: ten times what is asked for, and what unlike motions leave
 
 
 class ClockStatus(Enum):
@@ -80,7 +148,7 @@ def clock_between(reference: Track, other: Track, start: Ticks | None = None) ->
         found[: len(steps)] += steps
         if abs(steps[0]) < STILL_S:
             break
-    if line is None or abs(float(np.ravel(steps)[0])) > 1e-6 or not line.sigma[0] < USELESS_S:
+    if line is None or abs(float(np.ravel(steps)[0])) > 1e-6 or not line.sigma[0] < limits.USELESS_S:
         return ClockFit(ClockStatus.UNRELATED)
     drifting = len(line.values) > 1
     return ClockFit(
@@ -100,13 +168,13 @@ def _noise(reference: Track, other: Track) -> Floats:
 
 
 def _rows(
-    curve: Curve, other: Track, noise: Floats, middle_s: float, found: Floats
+    curve: TrackCurve, other: Track, noise: Floats, middle_s: float, found: Floats
 ) -> tuple[Floats, Floats, Ints] | None:
     """Columns of offset and drift, residual, block, in sigmas; level and gain of every block and channel taken out."""
     since_s = other.time_s - middle_s
     at_s = other.time_s + found[0] + found[1] * since_s
     expected, rate = curve.at(at_s), curve.rate(at_s)
-    block = np.floor((other.time_s - other.time_s[0]) / BLOCK_S).astype(np.intp)
+    block = np.floor((other.time_s - other.time_s[0]) / limits.BLOCK_S).astype(np.intp)
     good = np.all(np.isfinite(expected), axis=1)
     apart = other.values - expected
     X: list[Floats] = []
@@ -117,7 +185,7 @@ def _rows(
         one, rows = int(block[begin]), begin + np.flatnonzero(good[begin:end])
         if len(rows) < 8:
             continue
-        moves = np.flatnonzero(np.ptp(expected[rows], axis=0) > MOVES * noise)
+        moves = np.flatnonzero(np.ptp(expected[rows], axis=0) > limits.BLOCK_MOVES * noise)
         if not len(moves):
             continue
         at = np.ix_(rows, moves)
@@ -128,7 +196,7 @@ def _rows(
         both -= angle[:, :, None] * np.einsum("nc,nck->ck", angle / np.sum(angle**2, axis=0), both)
         X.append(both[:, :, :2].reshape(-1, 2))
         y.append(both[:, :, 2].ravel())
-        of.append(np.full(both[:, :, 2].size, one // TOGETHER, dtype=np.intp))
-    if len(np.unique([int(o[0]) for o in of])) < FEWEST_BLOCKS:
+        of.append(np.full(both[:, :, 2].size, one // limits.BLOCKS_TOGETHER, dtype=np.intp))
+    if len(np.unique([int(o[0]) for o in of])) < limits.FEWEST_BLOCKS:
         return None
     return np.concatenate(X), np.concatenate(y), np.concatenate(of)

@@ -10,16 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import correlate, correlation_lags
 
+from calibrate.diagnose.streams import limits
 from calibrate.diagnose.streams.track import Track
 
 Floats = NDArray[np.float64]
-
-GRID_S = 0.01  # 100 Hz: finer than any motion of an arm; the fine fit has a reach of some 50 ms
-SMOOTH = 5  # points of the grid
-WINDOW_S = 8.0
-REACH_S = 1.0  # of a window about the guess for all
-WORST_RATE = 1e-3  # between two clocks, or beside the rate that is known: ten times a poor quartz
-ALIKE = 0.6  # correlation below which a window does not count
 
 
 @dataclass(frozen=True)
@@ -33,7 +27,7 @@ class Ticks:
 
 def coarse(reference: Track, other: Track, start: Ticks | None = None) -> Ticks | None:
     """None where too little moves, or the motions are not alike. With `start` only REACH_S about it is searched."""
-    if len(reference.time_s) < 2 * SMOOTH or len(other.time_s) < 2 * SMOOTH:
+    if len(reference.time_s) < 2 * limits.GRID_SMOOTH or len(other.time_s) < 2 * limits.GRID_SMOOTH:
         return None
     rate_error, at_s = (start.rate_error, start.at_s) if start is not None else (0.0, 0.0)
     shifted = other.time_s + rate_error * (other.time_s - at_s)
@@ -42,14 +36,17 @@ def coarse(reference: Track, other: Track, start: Ticks | None = None) -> Ticks 
     if not (_range(ref) > 0.0 and _range(own) > 0.0):
         return None
     offset_s = start.offset_s if start is not None else _best(ref_s, ref, own_s, own)[0]
-    apart = [_window(ref_s, ref, own_s, own, begin, offset_s) for begin in np.arange(own_s[0], own_s[-1], WINDOW_S)]
+    apart = [
+        _window(ref_s, ref, own_s, own, begin, offset_s)
+        for begin in np.arange(own_s[0], own_s[-1], limits.COARSE_WINDOW_S)
+    ]
     seen = np.array([one for one in apart if one is not None])
     if not len(seen):
         return None
     if len(seen) < 3:
         return Ticks(float(np.median(seen[:, 1])), rate_error, at_s)
     level, more = straight_line(seen[:, 0], seen[:, 1])
-    if abs(more) > WORST_RATE:
+    if abs(more) > limits.WORST_RATE:
         return Ticks(offset_s, rate_error, at_s)  # too few windows to outvote a wild one
     total = (1.0 + rate_error) * (1.0 + more) - 1.0  # seen[:, 0] is on the clock that the start's rate made
     return Ticks(level + more * at_s, total, at_s)
@@ -65,16 +62,16 @@ def straight_line(x: Floats, y: Floats) -> tuple[float, float]:
 
 def _speeds(time_s: Floats, values: Floats) -> tuple[Floats, Floats]:
     """Norm of the channels' speeds on an even grid, each channel by its own size; NaN where nothing was read."""
-    grid = np.arange(time_s[0], time_s[-1], GRID_S)
+    grid = np.arange(time_s[0], time_s[-1], limits.GRID_S)
     size = np.std(values, axis=0)
     even = np.stack([np.interp(grid, time_s, channel) for channel in values.T], axis=1) / np.where(size > 0, size, 1.0)
-    kernel = np.ones(SMOOTH) / SMOOTH
+    kernel = np.ones(limits.GRID_SMOOTH) / limits.GRID_SMOOTH
     smooth = np.stack([np.convolve(channel, kernel, mode="same") for channel in even.T], axis=1)
-    speed = np.linalg.norm(np.gradient(smooth, GRID_S, axis=0), axis=1)
-    speed[: 2 * SMOOTH] = speed[-2 * SMOOTH :] = np.nan
+    speed = np.linalg.norm(np.gradient(smooth, limits.GRID_S, axis=0), axis=1)
+    speed[: 2 * limits.GRID_SMOOTH] = speed[-2 * limits.GRID_SMOOTH :] = np.nan
     nearest = np.clip(np.searchsorted(time_s, grid), 1, len(time_s) - 1)
-    hole = (time_s[nearest] - time_s[nearest - 1]) > max(5.0 * GRID_S, 5.0 * float(np.median(np.diff(time_s))))
-    speed[np.convolve(hole, np.ones(2 * SMOOTH + 1), mode="same") > 0] = np.nan
+    hole = (time_s[nearest] - time_s[nearest - 1]) > max(5.0 * limits.GRID_S, 5.0 * float(np.median(np.diff(time_s))))
+    speed[np.convolve(hole, np.ones(2 * limits.GRID_SMOOTH + 1), mode="same") > 0] = np.nan
     return grid, speed
 
 
@@ -92,7 +89,7 @@ def _best(ref_s: Floats, ref: Floats, own_s: Floats, own: Floats) -> tuple[float
     score = np.where(enough & (spread > floor), both / np.sqrt(np.maximum(spread, max(floor, 1e-300))), -1.0)
     at = int(np.argmax(score))
     lags = correlation_lags(len(ref), len(own))
-    return float(ref_s[0] - own_s[0] + lags[at] * GRID_S), float(score[at])
+    return float(ref_s[0] - own_s[0] + lags[at] * limits.GRID_S), float(score[at])
 
 
 def _slid(one: Floats, two: Floats) -> Floats:
@@ -109,9 +106,11 @@ def _window(
     ref_s: Floats, ref: Floats, own_s: Floats, own: Floats, begin_s: float, offset_s: float
 ) -> tuple[float, float] | None:
     """Middle of the window on the other clock, and its offset; None where it stands, or differs."""
-    mine = (own_s >= begin_s) & (own_s < begin_s + WINDOW_S)
-    theirs = (ref_s >= begin_s + offset_s - REACH_S) & (ref_s < begin_s + WINDOW_S + offset_s + REACH_S)
-    if mine.sum() < 4 * SMOOTH or theirs.sum() < mine.sum() or _range(own[mine]) < 0.05 * _range(own):
+    mine = (own_s >= begin_s) & (own_s < begin_s + limits.COARSE_WINDOW_S)
+    theirs = (ref_s >= begin_s + offset_s - limits.COARSE_REACH_S) & (
+        ref_s < begin_s + limits.COARSE_WINDOW_S + offset_s + limits.COARSE_REACH_S
+    )
+    if mine.sum() < 4 * limits.GRID_SMOOTH or theirs.sum() < mine.sum() or _range(own[mine]) < 0.05 * _range(own):
         return None
     found, alike = _best(ref_s[theirs], ref[theirs], own_s[mine], own[mine])
-    return (float(own_s[mine].mean()), found) if alike > ALIKE else None
+    return (float(own_s[mine].mean()), found) if alike > limits.WINDOW_CORRELATION else None

@@ -7,16 +7,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import binom
 
+from calibrate.diagnose.streams import limits
 from calibrate.diagnose.streams.track import Track, white_noise
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
-
-CHANCE = 1e-6  # of a run of equal readings by quantisation alone
-FEWEST_EQUAL = 5
-STEP_PERIODS = 2.5  # between two samples that the device counted as neighbours: its clock was set
-MOVES = 10.0  # steps of its own resolution, or sigmas of another device's noise, by which that one moved meanwhile
 
 
 class Fault(Enum):
@@ -83,7 +79,7 @@ def _steps(track: Track, sequence: Ints | None) -> list[Break]:
 
 def _odd(step_s: Floats, usual_s: float, counted: Ints | None) -> Bools:
     if counted is not None:
-        return (counted != 1) | (step_s < 0.0) | (step_s > STEP_PERIODS * usual_s)
+        return (counted != 1) | (step_s < 0.0) | (step_s > limits.CLOCK_STEP_PERIODS * usual_s)
     return (step_s <= 0.0) | (step_s > 1.5 * usual_s)
 
 
@@ -93,7 +89,7 @@ def _frozen(track: Track, moving: Track | None) -> list[Break]:
     for c in range(track.channels):
         values = track.values[:, c]
         equal = values[1:] == values[:-1]
-        long = [(first, last) for first, last in _runs(equal) if last - first + 1 >= FEWEST_EQUAL]
+        long = [(first, last) for first, last in _runs(equal) if last - first + 1 >= limits.FEWEST_EQUAL]
         seen = None if other is None else other[:, c]
         least = 0.0 if seen is None or not long else _least(values, seen)
         for first, last in long:
@@ -129,7 +125,7 @@ def _least(values: Floats, other: Floats) -> float:
 def _moved(meanwhile: Floats, least: float) -> bool:
     """Whether another device saw this channel move."""
     seen = meanwhile[np.isfinite(meanwhile)]
-    return len(seen) > 0 and bool(np.isfinite(least)) and float(np.ptp(seen)) > MOVES * least
+    return len(seen) > 0 and bool(np.isfinite(least)) and float(np.ptp(seen)) > limits.MOVED_MEANWHILE * least
 
 
 def _too_long(equal: Bools, first: int, last: int) -> bool:
@@ -137,4 +133,4 @@ def _too_long(equal: Bools, first: int, last: int) -> bool:
     run = last - first
     outside = len(equal) - run
     repeats = (int(equal.sum()) - run + 1) / max(outside + 1, 1)
-    return bool(len(equal) * binom.pmf(run, run, repeats) < CHANCE)
+    return bool(len(equal) * binom.pmf(run, run, repeats) < limits.FROZEN_CHANCE)

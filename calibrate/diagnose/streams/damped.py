@@ -14,16 +14,15 @@ from scipy.linalg import hankel
 from scipy.optimize import least_squares
 from scipy.stats import f
 
+from calibrate.diagnose.streams import limits
+
 Floats = NDArray[np.float64]
 
 GONE = 1e-9  # of a swing within one step: that is none
 POLES = 6  # one oscillation is two; the others take settling and noise
 MOST = 300  # samples of the pencil, averaged to that: it is a start only
 SAME = 0.05  # starts nearer than this in turn lead to the same place
-FEWEST_CYCLES = 1.5  # in the window; less is a bend, not an oscillation
-HARDEST = 0.5  # damping ratio: beyond, it hardly swings, and is settling
 SWING_SAMPLES = 8.0  # of one swing, for its decay and turn
-FINEST = 2.5  # samples of one swing
 
 
 @dataclass(frozen=True)
@@ -100,7 +99,7 @@ def _starts(t: Floats, y: Floats) -> list[tuple[float, float]]:
         turns = np.linalg.eigvals(np.linalg.lstsq(V[:-1], V[1:], rcond=None)[0]).astype(complex)
         poles = np.log(turns[np.abs(turns) > GONE]) / step_s
         out += [(-float(p.real), float(p.imag)) for p in poles if p.imag > 0.0]
-    slowest, fastest = 2.0 * np.pi * FEWEST_CYCLES / (t[-1] - t[0]), 2.0 * np.pi / (FINEST * step_s)
+    slowest, fastest = 2.0 * np.pi * limits.FEWEST_CYCLES / (t[-1] - t[0]), 2.0 * np.pi / (limits.FINEST_SWING * step_s)
     good = [(max(decay, 0.01 * turn), turn) for decay, turn in out if slowest < turn < fastest and decay < turn]
     return [one for i, one in enumerate(good) if all(abs(one[1] / other[1] - 1.0) > SAME for other in good[:i])]
 
@@ -122,8 +121,8 @@ def _refined(t: Floats, y: Floats, pole: tuple[float, float], before: float) -> 
     decay, turn = float(found.x[0]), abs(float(found.x[1]))
     undamped = float(np.hypot(decay, turn))
     cycles = turn * t[-1] / (2.0 * np.pi)
-    fastest = 2.0 * np.pi / (FINEST * float(np.median(np.diff(t))))
-    if not (0.0 < decay < HARDEST * undamped) or cycles < FEWEST_CYCLES or turn > fastest:
+    fastest = 2.0 * np.pi / (limits.FINEST_SWING * float(np.median(np.diff(t))))
+    if not (0.0 < decay < limits.MOST_DAMPING * undamped) or cycles < limits.FEWEST_CYCLES or turn > fastest:
         return None
     numbers = _numbers(y)
     normal = found.jac.T @ found.jac

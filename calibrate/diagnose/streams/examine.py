@@ -6,37 +6,32 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from calibrate.diagnose.streams.between_encoders import Causes
+from calibrate.diagnose.streams import limits
 from calibrate.diagnose.streams.clock import ClockFit, ClockStatus, clock_between
-from calibrate.diagnose.streams.clock_steps import judged, shares_host_clock
+from calibrate.diagnose.streams.clock_faults import judged, lateness, shares_host_clock
 from calibrate.diagnose.streams.coarse_clock import Ticks
 from calibrate.diagnose.streams.continuity import Fault, breaks
-from calibrate.diagnose.streams.finding import Outcome, StreamFinding
-from calibrate.diagnose.streams.findings_of import (
-    told_breaks,
-    told_following,
-    told_late,
-    told_reading_lag,
-    told_ringing,
-    told_slip,
-    told_unsettled,
-)
-from calibrate.diagnose.streams.following import SMALLEST_S, Following, following
-from calibrate.diagnose.streams.lateness import lateness
-from calibrate.diagnose.streams.recorded import Device, start_between
+from calibrate.diagnose.streams.following import Following, following
+from calibrate.diagnose.streams.recorded import StreamDevice, by_host, start_between
 from calibrate.diagnose.streams.ringing import Levers, ringing
-from calibrate.diagnose.streams.sample_times import by_host
-from calibrate.diagnose.streams.settling import Window, unsettled
-from calibrate.diagnose.streams.slips import slips
-from calibrate.diagnose.streams.stands import Stand, stands_of
-from calibrate.diagnose.streams.track import SIGMA_OF_MEDIAN, Track
+from calibrate.diagnose.streams.settling import Stand, Window, stands_of, unsettled
+from calibrate.diagnose.streams.slips import Causes, slips
+from calibrate.diagnose.streams.stream_findings import (
+    StreamFinding,
+    break_findings,
+    following_finding,
+    late_finding,
+    reading_lag_finding,
+    ringing_finding,
+    slip_finding,
+    unsettled_finding,
+)
+from calibrate.diagnose.streams.track import SIGMA_OF_MEDIAN, Outcome, Track
 
 Floats = NDArray[np.float64]
 Predicted = Callable[[Floats, Floats], Floats]  # (row, joint) rad and (row,) joints' clock -> (row, 4) spots, NaN: none
 
-SERVO_S = 0.05  # after the set-point stands, before what still swings is called ringing: a usual servo's own settling
 NUDGE_RAD = 1e-5  # of a joint, for its lever on the spots: far below what bends the beam's path
-FEWEST_JOINTS = 3  # whose common lag is the clock's
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,7 +46,7 @@ class StreamReport:
 
 
 def examine(
-    devices: Mapping[str, Device],
+    devices: Mapping[str, StreamDevice],
     predicted: Predicted | None = None,
     windows: Sequence[Window] | None = None,
     causes: Causes | None = None,
@@ -70,7 +65,7 @@ def examine(
     behind: tuple[Following, ...] = ()
     if command is not None:
         behind = following(command.track, joints.track)
-        found += [told_following(one) for one in behind if one.outcome is Outcome.FOUND]
+        found += [following_finding(one) for one in behind if one.outcome is Outcome.FOUND]
     if "encoders" in devices:
         clocks["encoders"], more = _encoders(joints, devices["encoders"], stands, causes)
         found += more
@@ -82,13 +77,13 @@ def examine(
     for name, fit in clocks.items():
         late = lateness(joints, devices[name], fit)
         if late is not None and late.counts:
-            found.append(told_late(name, late, joints.track.channels))
+            found.append(late_finding(name, late, joints.track.channels))
     found += _rings(joints.track, stands)
     return StreamReport(tuple(found), clocks, behind, stands, tuple(_unseen(devices, clocks, behind, windows)))
 
 
 def _unseen(
-    devices: Mapping[str, Device],
+    devices: Mapping[str, StreamDevice],
     clocks: Mapping[str, ClockFit],
     behind: Sequence[Following],
     windows: Sequence[Window] | None,
@@ -103,39 +98,39 @@ def _unseen(
     yield from (f"following error of joint {f.joint}: it hardly moves" for f in behind if f.behind_s is None)
 
 
-def _mended(devices: Mapping[str, Device]) -> tuple[list[StreamFinding], dict[str, Device]]:
+def _mended(devices: Mapping[str, StreamDevice]) -> tuple[list[StreamFinding], dict[str, StreamDevice]]:
     """What is broken in each stream, and the streams with steps of their clocks taken out.
 
     Joints share the clock of their set-point; spots are never without noise; encoders are judged once aligned.
     """
     found: list[StreamFinding] = []
-    out: dict[str, Device] = {}
+    out: dict[str, StreamDevice] = {}
     for name, device in devices.items():
         moving = devices["command"].track if name == "joints" and "command" in devices else None
         faults = breaks(device.track, device.sequence, moving, noisy=name == "spots")
         told, out[name] = judged(device, faults)
-        found += told_breaks(device.track, told)
+        found += break_findings(device.track, told)
     return found, out
 
 
 def _encoders(
-    joints: Device, encoders: Device, stands: tuple[Stand, ...], causes: Causes | None
+    joints: StreamDevice, encoders: StreamDevice, stands: tuple[Stand, ...], causes: Causes | None
 ) -> tuple[ClockFit, list[StreamFinding]]:
     fit = clock_between(joints.track, encoders.track, start_between(joints, encoders))
     if fit.offset_s is None:
         return _by_stamps(joints, encoders, stands, causes) if shares_host_clock(encoders) else (fit, [])
     lags = following(joints.track, _moved(encoders.track, fit))
     alike = _alike(lags)
-    if len(alike) >= FEWEST_JOINTS and any(one.outcome is Outcome.FOUND for one in lags):
+    if len(alike) >= limits.LAGGING_TOGETHER and any(one.outcome is Outcome.FOUND for one in lags):
         # one late joint pulls the common clock: what most joints share is the clock, the rest is that joint's own
         again = clock_between(_of(joints.track, alike), _of(encoders.track, alike), start_between(joints, encoders))
         fit = fit if again.offset_s is None else again
         lags = following(joints.track, _moved(encoders.track, fit))
     at_joints = _moved(encoders.track, fit)
-    found = [told_reading_lag(one) for one in lags if one.outcome is Outcome.FOUND]
-    found += [told_slip(one) for one in slips(at_joints, joints.track, stands, causes).found]
+    found = [reading_lag_finding(one) for one in lags if one.outcome is Outcome.FOUND]
+    found += [slip_finding(one) for one in slips(at_joints, joints.track, stands, causes).found]
     frozen = [one for one in breaks(at_joints, None, _behind(joints.track, lags)) if one.fault is Fault.FROZEN]
-    return fit, found + told_breaks(at_joints, frozen) + _rings(at_joints, stands)
+    return fit, found + break_findings(at_joints, frozen) + _rings(at_joints, stands)
 
 
 def _behind(track: Track, lags: Sequence[Following]) -> Track:
@@ -149,7 +144,7 @@ def _behind(track: Track, lags: Sequence[Following]) -> Track:
 
 
 def _by_stamps(
-    joints: Device, encoders: Device, stands: tuple[Stand, ...], causes: Causes | None
+    joints: StreamDevice, encoders: StreamDevice, stands: tuple[Stand, ...], causes: Causes | None
 ) -> tuple[ClockFit, list[StreamFinding]]:
     """A host that runs at no even pace beside the joints leads to their clock piece by piece, to some milliseconds.
 
@@ -160,7 +155,7 @@ def _by_stamps(
     fit = clock_between(joints.track, track, Ticks(0.0))
     if fit.offset_s is None:
         return fit, []
-    found = [told_slip(one) for one in slips(_moved(track, fit), joints.track, stands, causes).found]
+    found = [slip_finding(one) for one in slips(_moved(track, fit), joints.track, stands, causes).found]
     return ClockFit(ClockStatus.UNEVEN), found
 
 
@@ -171,7 +166,7 @@ def _alike(lags: Sequence[Following]) -> list[int]:
         return []
     usual = float(np.median(list(behind.values())))
     scatter = SIGMA_OF_MEDIAN * float(np.median([abs(b - usual) for b in behind.values()]))
-    return [c for c, b in behind.items() if abs(b - usual) <= max(3.0 * scatter, SMALLEST_S)]
+    return [c for c, b in behind.items() if abs(b - usual) <= max(3.0 * scatter, limits.BEHIND_S)]
 
 
 def _of(track: Track, channels: list[int]) -> Track:
@@ -187,7 +182,7 @@ class _Spots:
     findings: list[StreamFinding]
 
 
-def _spots(joints: Device, spots: Device, stands: tuple[Stand, ...], predicted: Predicted | None) -> _Spots:
+def _spots(joints: StreamDevice, spots: StreamDevice, stands: tuple[Stand, ...], predicted: Predicted | None) -> _Spots:
     by_stamps = replace(spots.track, time_s=by_host(spots.track.time_s, spots, joints))
     if predicted is None:
         return _Spots(by_stamps, None, [])
@@ -195,12 +190,12 @@ def _spots(joints: Device, spots: Device, stands: tuple[Stand, ...], predicted: 
     model = Track("predicted spots", "m", track.time_s, predicted(track.values, track.time_s))
     fit = clock_between(model, spots.track, start_between(joints, spots))
     at_joints = _moved(spots.track, fit) if fit.offset_s is not None else by_stamps
-    rings = ringing(at_joints, stands, levers_of(track, predicted), SERVO_S)
-    return _Spots(at_joints, fit, [told_ringing(at_joints, rings)] if rings.stops else [])
+    rings = ringing(at_joints, stands, levers_of(track, predicted), limits.SERVO_S)
+    return _Spots(at_joints, fit, [ringing_finding(at_joints, rings)] if rings.stops else [])
 
 
 def _unsettled(
-    spots: Device, seen: _Spots, windows: Sequence[Window] | None, stands: tuple[Stand, ...], joints: int
+    spots: StreamDevice, seen: _Spots, windows: Sequence[Window] | None, stands: tuple[Stand, ...], joints: int
 ) -> list[StreamFinding]:
     """Windows move with the spots, so the samples in them stay the same whatever the clocks."""
     if not windows:
@@ -213,7 +208,7 @@ def _unsettled(
     each = unsettled(seen.track, moved, stands)
     if not any(one.outcome is Outcome.FOUND for one in each):
         return []
-    return [told_unsettled(seen.track, moved, each, joints)]
+    return [unsettled_finding(seen.track, moved, each, joints)]
 
 
 def levers_of(joints: Track, predicted: Predicted) -> Levers:
@@ -236,5 +231,5 @@ def _moved(track: Track, fit: ClockFit) -> Track:
 
 def _rings(track: Track, stands: tuple[Stand, ...]) -> list[StreamFinding]:
     """Of angles: every joint turns its own reading only."""
-    rings = ringing(track, stands, lambda _: np.eye(track.channels), SERVO_S)
-    return [told_ringing(track, rings)] if rings.stops else []
+    rings = ringing(track, stands, lambda _: np.eye(track.channels), limits.SERVO_S)
+    return [ringing_finding(track, rings)] if rings.stops else []

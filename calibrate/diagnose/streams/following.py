@@ -13,17 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import norm
 
-from calibrate.diagnose.streams.clustered import Line, fit
-from calibrate.diagnose.streams.finding import Outcome
-from calibrate.diagnose.streams.track import Track
+from calibrate.diagnose.streams import limits
+from calibrate.diagnose.streams.clock import RobustLine, fit
+from calibrate.diagnose.streams.track import Outcome, Track
 
 Floats = NDArray[np.float64]
-
-BLOCK_S = 0.5
-SLOWEST_RAD_S = 0.02  # rms speed of a joint below which it has not moved
-ALARM = 1e-3
-SMALLEST_S = 2e-5  # a fiftieth of the finest sampling: nothing is claimed below
-SMOOTH_S = 0.008  # over which a speed is formed: one sample of the slowest controller
 
 
 @dataclass(frozen=True)
@@ -50,11 +44,13 @@ def following(command: Track, reading: Track) -> tuple[Following, ...]:
     reading = reading.read()
     curve = command.curve
     at = curve.at(reading.time_s)
-    v = (curve.at(reading.time_s + SMOOTH_S) - curve.at(reading.time_s - SMOOTH_S)) / (2.0 * SMOOTH_S)
-    bend = curve.at(reading.time_s + SMOOTH_S) - 2.0 * at + curve.at(reading.time_s - SMOOTH_S)
-    a = bend / SMOOTH_S**2
+    v = (curve.at(reading.time_s + limits.SPEED_OVER_S) - curve.at(reading.time_s - limits.SPEED_OVER_S)) / (
+        2.0 * limits.SPEED_OVER_S
+    )
+    bend = curve.at(reading.time_s + limits.SPEED_OVER_S) - 2.0 * at + curve.at(reading.time_s - limits.SPEED_OVER_S)
+    a = bend / limits.SPEED_OVER_S**2
     good = np.all(np.isfinite(at) & np.isfinite(v) & np.isfinite(a), axis=1)
-    block = np.floor((reading.time_s - reading.time_s[:1].sum()) / BLOCK_S).astype(np.intp)
+    block = np.floor((reading.time_s - reading.time_s[:1].sum()) / limits.BLOCK_S).astype(np.intp)
     return tuple(
         _joint(j + 1, (at - reading.values)[good, j], v[good, j], a[good, j], block[good])
         for j in range(reading.channels)
@@ -62,14 +58,14 @@ def following(command: Track, reading: Track) -> tuple[Following, ...]:
 
 
 def _joint(joint: int, error: Floats, v: Floats, a: Floats, block: NDArray[np.intp]) -> Following:
-    if not len(error) or float(np.sqrt(np.mean(v**2))) < SLOWEST_RAD_S:
+    if not len(error) or float(np.sqrt(np.mean(v**2))) < limits.SLOWEST_RAD_S:
         return Following(joint, Outcome.NOT_DETERMINABLE)
     line = fit(np.stack([v, a, np.ones_like(v)], axis=1), error, block, rounds=1)
     if line is None:
         return Following(joint, Outcome.NOT_DETERMINABLE)
     behind_s, sigma_s = float(line.values[0]), float(line.sigma[0])
     p = float(2.0 * norm.sf(abs(behind_s) / max(sigma_s, 1e-300)))
-    found = p < ALARM and abs(behind_s) > SMALLEST_S
+    found = p < limits.FOLLOWING_ALPHA and abs(behind_s) > limits.BEHIND_S
     return Following(
         joint,
         Outcome.FOUND if found else Outcome.ABSENT,
@@ -82,7 +78,7 @@ def _joint(joint: int, error: Floats, v: Floats, a: Floats, block: NDArray[np.in
     )
 
 
-def _kind(line: Line) -> str:
+def _kind(line: RobustLine) -> str:
     """By what acceleration adds, where its sigma separates the two."""
     behind_s, by_a = float(line.values[0]), float(line.values[1])
     sigma = float(line.sigma[1])

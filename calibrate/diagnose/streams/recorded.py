@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.recording import Recording, Stream
+from calibrate.diagnose.streams import limits
 from calibrate.diagnose.streams.coarse_clock import Ticks, straight_line
 from calibrate.diagnose.streams.track import SIGMA_OF_MEDIAN, Track
 
@@ -16,12 +17,10 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 COMMAND, JOINTS, ENCODERS, CURRENTS = "target_q_rad", "actual_q_rad", "position_rad", "photocurrent_a"
-DARK = 0.2  # of the usual light: a beam half off a face falls from full to nothing within its own width
-WINDOWS = 30  # of host time, in each of which the promptest stamp counts
 
 
 @dataclass(frozen=True, eq=False)
-class Device:
+class StreamDevice:
     """A track with its device's counter and the host's stamps."""
 
     track: Track
@@ -29,7 +28,7 @@ class Device:
     host_s: Floats
 
 
-def devices_of(recording: Recording) -> Mapping[str, Device]:
+def devices_of(recording: Recording) -> Mapping[str, StreamDevice]:
     """Those that the recording has of "command", "joints", "encoders", "spots"."""
     found = {
         "command": _of(recording, COMMAND, "command"),
@@ -40,7 +39,7 @@ def devices_of(recording: Recording) -> Mapping[str, Device]:
     return {name: device for name, device in found.items() if device is not None}
 
 
-def start_between(reference: Device, other: Device) -> Ticks | None:
+def start_between(reference: StreamDevice, other: StreamDevice) -> Ticks | None:
     """From the host's stamps: each device's promptest ones, which were delayed least. None where they show nothing."""
     one, two = _host_line(reference), _host_line(other)
     if one is None or two is None:
@@ -51,7 +50,7 @@ def start_between(reference: Device, other: Device) -> Ticks | None:
     return Ticks((host_s - one[0]) / one[1] - at_s, rate - 1.0, at_s)
 
 
-def stamps_scatter_s(device: Device) -> float:
+def stamps_scatter_s(device: StreamDevice) -> float:
     """How well the host's stamps give the device's time, in its seconds: scatter of the promptest about their line.
 
     Infinite without a line.
@@ -67,16 +66,16 @@ def _stream(recording: Recording, channel: str) -> Stream | None:
     return next((s for s in recording.streams.values() if channel in s.values and len(s.host_s)), None)
 
 
-def _of(recording: Recording, channel: str, name: str) -> Device | None:
+def _of(recording: Recording, channel: str, name: str) -> StreamDevice | None:
     stream = _stream(recording, channel)
     if stream is None:
         return None
     values = np.asarray(stream.values[channel], dtype=float)
     values = values.reshape(len(values), math.prod(values.shape[1:]))  # also of a stream without a sample
-    return Device(Track(name, "rad", stream.device_s, values), stream.sequence, stream.host_s)
+    return StreamDevice(Track(name, "rad", stream.device_s, values), stream.sequence, stream.host_s)
 
 
-def _spots(recording: Recording) -> Device | None:
+def _spots(recording: Recording) -> StreamDevice | None:
     """Of every photocurrent, by the duo-lateral formula (On-Trak Photonics, "PSD theory"); NaN unless both are lit."""
     stream, fixture = _stream(recording, CURRENTS), recording.rig.fixture
     if stream is None or fixture is None:
@@ -86,26 +85,32 @@ def _spots(recording: Recording) -> Device | None:
     with np.errstate(invalid="ignore", divide="ignore"):
         spot = fixture.half_size_m * (current[..., 1] - current[..., 0]) / total
     usual = np.nanpercentile(total, 90.0, axis=0)
-    dark = np.any(~(total > DARK * usual), axis=(1, 2))
+    dark = np.any(~(total > limits.DARK * usual), axis=(1, 2))
     values = np.where(dark[:, None], np.nan, spot.reshape(-1, 4))
-    return Device(Track("spots", "m", stream.device_s, values), stream.sequence, stream.host_s)
+    return StreamDevice(Track("spots", "m", stream.device_s, values), stream.sequence, stream.host_s)
 
 
-def _host_line(device: Device) -> tuple[float, float] | None:
+def _host_line(device: StreamDevice) -> tuple[float, float] | None:
     """Level and rate of host = level + rate device, through the least delayed stamps."""
     prompt = _prompt(device)
-    if len(prompt) < WINDOWS // 2:
+    if len(prompt) < limits.PROMPT_WINDOWS // 2:
         return None
     level, rate = straight_line(device.track.time_s[prompt], device.host_s[prompt])
     return (level, rate) if rate > 0.0 else None
 
 
-def _prompt(device: Device) -> list[int]:
+def _prompt(device: StreamDevice) -> list[int]:
     """The sample of each window that came least late."""
     t, host = device.track.time_s, device.host_s
-    if len(t) < 4 * WINDOWS or not np.ptp(t) > 0.0 or not np.ptp(host) > 0.0:
+    if len(t) < 4 * limits.PROMPT_WINDOWS or not np.ptp(t) > 0.0 or not np.ptp(host) > 0.0:
         return []
     late = host - np.ptp(host) / np.ptp(t) * t
-    edges = np.linspace(t[0], t[-1], WINDOWS + 1)
+    edges = np.linspace(t[0], t[-1], limits.PROMPT_WINDOWS + 1)
     at = (np.flatnonzero((t >= a) & (t <= b)) for a, b in pairwise(edges))
     return [int(rows[np.argmin(late[rows])]) for rows in at if len(rows)]
+
+
+def by_host(time_s: Floats, own: StreamDevice, other: StreamDevice) -> Floats:
+    """Times of `own` on the clock of `other`, by the host's stamps of both: good to what the lines delay."""
+    host_s = np.interp(time_s, own.track.time_s, np.maximum.accumulate(own.host_s))
+    return np.interp(host_s, np.maximum.accumulate(other.host_s), other.track.time_s)

@@ -7,20 +7,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
+from calibrate.diagnose.streams import limits
 from calibrate.diagnose.streams.damped import Swing, chance, swing
-from calibrate.diagnose.streams.finding import Outcome
-from calibrate.diagnose.streams.stands import Stand
-from calibrate.diagnose.streams.track import Track, white_noise
+from calibrate.diagnose.streams.settling import Stand
+from calibrate.diagnose.streams.track import Outcome, Track, white_noise
 
 Floats = NDArray[np.float64]
 Levers = Callable[[float], Floats]  # time of the stream -> (channel, joint) what a turn of each joint does to it
-
-WINDOW_S = 2.0  # a machine of 3 Hz and 2 % has faded to a third by then
-FEWEST_SAMPLES = 40
-ALARM = 1e-3  # family-wise over all stops
-AGAIN = 0.2  # share of the stops: what swings after one of many is a knock or the servo, not a soft machine
-CLEAR = 0.9  # share of the swing that one joint explains
-RIVAL = 0.05  # of the share: joints within it are not separated
 
 
 @dataclass(frozen=True)
@@ -46,8 +39,10 @@ def ringing(track: Track, stands: Sequence[Stand], levers: Levers | None = None,
     looked = 0
     track = track.read()
     for stand in stands:
-        window = track.between(stand.from_s + after_s, min(stand.to_s, stand.from_s + after_s + WINDOW_S))
-        if len(window.time_s) < FEWEST_SAMPLES:
+        window = track.between(
+            stand.from_s + after_s, min(stand.to_s, stand.from_s + after_s + limits.RINGING_WINDOW_S)
+        )
+        if len(window.time_s) < limits.RINGING_SAMPLES:
             continue
         looked += 1
         if not np.any(np.ptp(window.values, axis=0) > 0.0):
@@ -64,11 +59,11 @@ def ringing(track: Track, stands: Sequence[Stand], levers: Levers | None = None,
             )
     if not looked:
         return Ringing(Outcome.NOT_DETERMINABLE)
-    sure = [one for one in seen if one[3] * looked < ALARM]
+    sure = [one for one in seen if one[3] * looked < limits.RINGING_ALPHA]
     if not sure:
         return Ringing(Outcome.ABSENT)
     alike = _alike(sure)
-    return _joined(alike, levers, looked) if len(alike) >= AGAIN * looked else Ringing(Outcome.ABSENT)
+    return _joined(alike, levers, looked) if len(alike) >= limits.RINGING_STOPS * looked else Ringing(Outcome.ABSENT)
 
 
 def _noise(values: Floats) -> Floats:
@@ -133,6 +128,8 @@ def _joint(sure: list[tuple[Stand, float, Swing, float]], levers: Levers | None)
         return None, ()
     share = np.asarray(explained) / total
     best = int(np.argmax(share))
-    if share[best] < CLEAR:
+    if share[best] < limits.RINGING_JOINT:
         return None, ()
-    return best + 1, tuple(int(i) + 1 for i in np.flatnonzero(share > share[best] - RIVAL) if i != best)
+    return best + 1, tuple(
+        int(i) + 1 for i in np.flatnonzero(share > share[best] - limits.RINGING_JOINTS_TIED) if i != best
+    )

@@ -1,4 +1,7 @@
-"""Samples taken before the arm had settled: the mean of a sample's window against the rest of the same stand."""
+"""Samples taken before the arm had settled: the mean of a sample's window against the rest of the same stand.
+
+When the arm was asked to stand: stretches in which the set-point does not change.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -7,16 +10,56 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import norm
 
-from calibrate.diagnose.streams.finding import Outcome
-from calibrate.diagnose.streams.stands import Stand
-from calibrate.diagnose.streams.track import Track, white_noise
+from calibrate.diagnose.streams import limits
+from calibrate.diagnose.streams.track import Outcome, Track, white_noise
 
 Floats = NDArray[np.float64]
 
-ALARM = 1e-3  # over all samples
-MATTERS = 1.0  # sigmas of one reading: below, nobody would see it
-LATER_S = 0.05  # of the stand, at least, from which the settled reading is taken
-BLOCK = 5  # samples averaged before the noise of a mean is judged: it may hang together over some
+
+@dataclass(frozen=True)
+class Stand:
+    """`moved` (channel,): change of the set-point in the motion before; zero for the first."""
+
+    from_s: float
+    to_s: float
+    moved: Floats
+
+
+def stands_of(setpoint: Track) -> tuple[Stand, ...]:
+    """Stands of at least SHORTEST_STAND_S: of the set-point, or of joints as read; both are flat at a stand."""
+    setpoint = setpoint.read()
+    if len(setpoint.time_s) < 3:
+        return ()
+    span = max(1, round(0.03 / max(setpoint.period_s, 1e-4)))
+    change = np.abs(setpoint.values[span:] - setpoint.values[:-span]).max(axis=1, initial=0.0)
+    taken_s = setpoint.time_s[span:] - setpoint.time_s[:-span]
+    moving = np.zeros(len(setpoint.time_s), dtype=bool)
+    fast = change > limits.MOVING_RAD_S * np.maximum(taken_s, 1e-9)
+    moving[:-span] |= fast  # from its first sample to its last: a change within the span belongs to the motion
+    moving[span:] |= fast
+    edges = np.flatnonzero(np.diff(np.concatenate([[1], moving.astype(int), [1]])))
+    out: list[Stand] = []
+    before = None
+    for begin, end in zip(edges[::2], edges[1::2], strict=True):
+        at = setpoint.values[begin:end].mean(axis=0)
+        # a stand is widened by the span that moving was widened by, but not over a change
+        begin, end = _widened(setpoint, int(begin), int(end), span, at)
+        from_s, to_s = float(setpoint.time_s[begin]), float(setpoint.time_s[end - 1])
+        if to_s - from_s >= limits.SHORTEST_STAND_S:
+            out.append(Stand(from_s, to_s, np.zeros_like(at) if before is None else at - before))
+            before = at
+    return tuple(out)
+
+
+def _widened(setpoint: Track, begin: int, end: int, span: int, at: Floats) -> tuple[int, int]:
+    lowest, highest = max(0, begin - span), min(len(setpoint.time_s), end + span)
+    near = np.abs(setpoint.values[lowest:highest] - at).max(axis=1) <= limits.MOVING_RAD_S * 0.03
+    first, last = begin, end
+    while first > lowest and near[first - 1 - lowest]:
+        first -= 1
+    while last < highest and near[last - lowest]:
+        last += 1
+    return first, last
 
 
 @dataclass(frozen=True)
@@ -51,19 +94,19 @@ def _stand_of(window: Window, stands: Sequence[Stand]) -> Stand | None:
 
 
 def _of_window(track: Track, window: Window, stand: Stand | None, tests: int) -> Unsettled:
-    if stand is None or stand.to_s - window.to_s < LATER_S:
+    if stand is None or stand.to_s - window.to_s < limits.SETTLED_AFTER_S:
         return Unsettled(Outcome.NOT_DETERMINABLE)
     own = _cut(track, max(window.from_s, stand.from_s), window.to_s).values
     late_from_s = max(window.to_s, 0.5 * (window.to_s + stand.to_s))
     late = _cut(track, late_from_s, stand.to_s).values
-    if len(own) < 2 or len(late) < 2 * BLOCK:
+    if len(own) < 2 or len(late) < 2 * limits.SETTLING_BLOCK:
         return Unsettled(Outcome.NOT_DETERMINABLE)
     missing = late.mean(axis=0) - own.mean(axis=0)
     white = np.maximum(white_noise(late), _slow(late))
     white = np.where(np.isfinite(white) & (white > 0.0), white, np.finfo(float).tiny)
     sigma = white * np.sqrt(1.0 / len(own) + 1.0 / len(late))
     p = min(1.0, tests * len(missing) * float(2.0 * norm.sf(np.max(np.abs(missing) / sigma))))
-    if p >= ALARM or np.all(np.abs(missing) < MATTERS * white):
+    if p >= limits.SETTLING_ALPHA or np.all(np.abs(missing) < limits.MISSED_SIGMAS * white):
         return Unsettled(Outcome.ABSENT, missing, sigma, p=p)
     settling = _cut(track, stand.from_s, stand.to_s)
     return Unsettled(Outcome.FOUND, missing, sigma, *_decay(settling, window, white), p=p)
@@ -77,11 +120,11 @@ def _cut(track: Track, from_s: float, to_s: float) -> Track:
 
 def _slow(values: Floats) -> Floats:
     """(channel,) sigma of a sample that the scatter of means of BLOCK samples stands for."""
-    whole = len(values) // BLOCK * BLOCK
-    means = values[:whole].reshape(-1, BLOCK, values.shape[1]).mean(axis=1)
+    whole = len(values) // limits.SETTLING_BLOCK * limits.SETTLING_BLOCK
+    means = values[:whole].reshape(-1, limits.SETTLING_BLOCK, values.shape[1]).mean(axis=1)
     if len(means) < 4:
         return np.zeros(values.shape[1])
-    return np.sqrt(BLOCK * np.mean(np.diff(means, axis=0) ** 2, axis=0) / 2.0)
+    return np.sqrt(limits.SETTLING_BLOCK * np.mean(np.diff(means, axis=0) ** 2, axis=0) / 2.0)
 
 
 def _decay(stand: Track, window: Window, noise: Floats) -> tuple[float | None, float | None]:

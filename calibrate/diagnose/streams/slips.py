@@ -2,12 +2,16 @@
 
 Judged from stand to stand, because between them everything that moves adds to the difference. What may be innocent is
 taken along: an error of either reading that depends on the angle (first two orders, Bai and Teo 2002), a slow drift,
-the side from which the joint came, and what physics at the joint asks for (between_encoders.py): a slip comes last.
+the side from which the joint came, and what physics at the joint asks for (`causes_of`): a slip comes last.
 The noise is what scatters from stand to stand then. Steps are found one by one, the largest first (binary
 segmentation: Vostrikova 1981), each by its F statistic over all places; p from the largest of as many tests.
+
+Physics at the joint is the torque of gravity at the pose (a soft drive), the side from which the joint came (play), and
+what the diagnosis of the samples has found there. Each is a column whose size the difference itself decides, so that
+nothing depends on which of the two encoders sits where.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,19 +19,22 @@ from numpy.typing import NDArray
 from scipy.linalg import orth
 from scipy.stats import t as student
 
-from calibrate.diagnose.streams.between_encoders import Causes
-from calibrate.diagnose.streams.stands import Stand
-from calibrate.diagnose.streams.track import Curve, Track
+from calibrate.diagnose.search.null import is_slow
+from calibrate.diagnose.state.fitted import Fitted
+from calibrate.diagnose.streams import limits
+from calibrate.diagnose.streams.settling import Stand
+from calibrate.diagnose.streams.track import Track, TrackCurve
 from calibrate.model.effects.conditions import MOVED_RAD
+from calibrate.model.effects.gravity import likely_torque_nm
+from calibrate.model.effects.ports import Perturbation
+from calibrate.model.sensors.encoder_difference import NAME as ENCODER_DIFFERENCE
+from calibrate.model.with_effects.new_poses import carried_over, extended
+from calibrate.model.with_effects.ported_chain import perturbed_frames
 
 Floats = NDArray[np.float64]
+Causes = Callable[[int, Floats], Floats]  # joint (from 1) and poses (stand, joint) to columns (stand, m)
 
-ALARM = 1e-3  # over all joints and places
-SPARE = 5  # stands beyond the numbers that are fitted
-MOST = 5  # slips of one joint: then it is not slipping but loose
-ENOUGH = 12  # stands more, for what physics may ask for
 FLAT = 1e-9  # of a column: rounding
-EDGE_S = 0.1  # after the set-point stands, before readings count
 
 
 @dataclass(frozen=True)
@@ -71,7 +78,7 @@ def slips(track: Track, other: Track, stands: Sequence[Stand], causes: Causes | 
     return Slips(tuple(sorted(found, key=lambda slip: slip.from_s)), tuple(judged))
 
 
-def _pieces(difference: Track, at: Curve, stands: Sequence[Stand], j: int) -> Floats:
+def _pieces(difference: Track, at: TrackCurve, stands: Sequence[Stand], j: int) -> Floats:
     """(stand, 5 + joint): begin, end, mean difference, angle, side that the joint came from, angles of all joints.
 
     A stand with a jump in it gives two.
@@ -80,7 +87,7 @@ def _pieces(difference: Track, at: Curve, stands: Sequence[Stand], j: int) -> Fl
     side = 0.0
     for stand in stands:
         side = float(np.sign(stand.moved[j])) if abs(stand.moved[j]) > MOVED_RAD else side
-        rows = difference.between(stand.from_s + EDGE_S, stand.to_s)
+        rows = difference.between(stand.from_s + limits.SLIP_EDGE_S, stand.to_s)
         if len(rows.time_s) < 4:
             continue
         d = rows.values[:, j]
@@ -94,7 +101,11 @@ def _pieces(difference: Track, at: Curve, stands: Sequence[Stand], j: int) -> Fl
 
 def _innocent(j: int, pieces: Floats, causes: Causes | None) -> list[Floats]:
     """Columns (stand,) of unit size that physics may ask for; none where stands are too few."""
-    if causes is None or len(pieces) < SPARE + ENOUGH or not np.isfinite(pieces).all():
+    if (
+        causes is None
+        or len(pieces) < limits.SLIP_SPARE_STANDS + limits.SLIP_PHYSICS_STANDS
+        or not np.isfinite(pieces).all()
+    ):
         return []
     columns = [pieces[:, 4], *causes(j + 1, pieces[:, 5:]).T]
     centred = [c - c.mean() for c in columns]
@@ -119,18 +130,18 @@ def _jump(d: Floats) -> int:
 def _of_joint(joint: int, pieces: Floats, joints: int, innocent: Sequence[Floats] = ()) -> list[Slip] | None:
     """None where stands are too few."""
     n = len(pieces)
-    if n < SPARE + 4:
+    if n < limits.SLIP_SPARE_STANDS + 4:
         return None
     q, d, t = pieces[:, 3], pieces[:, 2], pieces[:, 0]
     level = [np.ones(n)]
-    if n >= SPARE + 9 and np.ptp(q) > 0.0:
+    if n >= limits.SLIP_SPARE_STANDS + 9 and np.ptp(q) > 0.0:
         level += [np.sin(q), np.cos(q), np.sin(2.0 * q), np.cos(2.0 * q)]
-    if n >= SPARE + 6:
+    if n >= limits.SLIP_SPARE_STANDS + 6:
         level.append((t - t.mean()) / max(float(np.ptp(t)), 1e-12))
-    level += innocent[: max(0, n - SPARE - 4 - len(level))]
+    level += innocent[: max(0, n - limits.SLIP_SPARE_STANDS - 4 - len(level))]
     places: list[int] = []
     out: dict[int, Slip] = {}
-    while len(places) < MOST:
+    while len(places) < limits.MOST_SLIPS:
         base = np.stack([*level, *((np.arange(n) >= k).astype(float) for k in places)], axis=1)
         best = _best(base, d, n * joints)
         if best is None or best[0] in places:
@@ -145,7 +156,7 @@ def _best(base: Floats, d: Floats, tests: int) -> tuple[int, float] | None:
     U = orth(base)
     residual = d - U @ (U.T @ d)
     n, k = len(d), U.shape[1] + 1
-    if n - k < SPARE - 1:
+    if n - k < limits.SLIP_SPARE_STANDS - 1:
         return None
     best: tuple[int, float] | None = None
     for place in range(2, n - 1):
@@ -157,7 +168,7 @@ def _best(base: Floats, d: Floats, tests: int) -> tuple[int, float] | None:
         value = float(step @ residual) / size
         left = float(np.sum((residual - value * step) ** 2)) / (n - k)
         p = tests * 2.0 * float(student.sf(abs(value) / np.sqrt(max(left, 1e-300) / size), n - k))
-        if p < ALARM and (best is None or p < best[1]):
+        if p < limits.SLIP_ALPHA and (best is None or p < best[1]):
             best = place, p
     return best
 
@@ -179,3 +190,26 @@ def _sized(
         p = min(1.0, tests * 2.0 * float(student.sf(abs(values[at]) / max(sigma, 1e-300), left)))
         out[place] = Slip(joint, float(pieces[place - 1, 1]), float(pieces[place, 0]), float(values[at]), sigma, p)
     return out
+
+
+def causes_of(fitted: Fitted) -> Causes:
+    """Of a fitted session, at any poses."""
+    arm, drivers = fitted.session.arm, fitted.drivers
+    values = fitted.geometry[: len(arm.parameters)]
+
+    def columns(joint: int, q_rad: Floats) -> Floats:
+        frames = perturbed_frames(arm, values, q_rad, Perturbation.none(len(q_rad), q_rad.shape[1]))
+        away = np.abs(q_rad[:, None, :] - drivers.q_rad[None]).max(axis=2)
+        there = extended(drivers, q_rad, frames, np.argmin(away, axis=1))
+        out = [likely_torque_nm(there, joint)[-len(q_rad) :]]
+        for accepted in fitted.accepted:
+            term = accepted.term
+            mine = term.port.between_encoders or term.port.instrument == ENCODER_DIFFERENCE
+            if not mine or term.port.where != f"joint{joint}.angle" or is_slow(term):
+                continue
+            basis = carried_over(accepted, drivers, there)
+            if basis is not None:
+                out += list(np.sum(basis, axis=1).T)  # the port's other joints are zero
+        return np.stack(out, axis=1)
+
+    return columns

@@ -2,21 +2,30 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from enum import Enum
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
+from calibrate.diagnose.streams import limits
 from calibrate.errors import DataError
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 Ints = NDArray[np.intp]
 
-GAP_PERIODS = 5.0  # a longer pause is not bridged by a curve: an arm can do anything meanwhile
 FEWEST = 4  # points of a cubic
 SIGMA_OF_MEDIAN = 1.4826  # 1 / 0.67449: sigma of normal noise over the median of its absolute values
+
+
+class Outcome(Enum):
+    """Of one finder at one stream."""
+
+    FOUND = "beyond the stream's own noise"
+    ABSENT = "not beyond the stream's own noise"
+    NOT_DETERMINABLE = "this motion does not show it"
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,9 +59,9 @@ class Track:
         return self.take(np.flatnonzero(good)[first])
 
     @cached_property
-    def curve(self) -> "Curve":
+    def curve(self) -> "TrackCurve":
         """Between its samples; made once."""
-        return Curve(self)
+        return TrackCurve(self)
 
     def take(self, rows: Bools | Ints | slice) -> "Track":
         return replace(self, time_s=self.time_s[rows], values=self.values[rows])
@@ -62,7 +71,7 @@ class Track:
         return self.take((self.time_s >= from_s) & (self.time_s <= to_s))
 
 
-class Curve:
+class TrackCurve:
     """A track between its samples: cubic splines, NaN in gaps and outside. `rate`: its slope, (time, channel)."""
 
     def __init__(self, track: Track) -> None:
@@ -94,7 +103,7 @@ def stretches(time_s: Floats) -> Iterator[slice]:
         return
     steps = np.diff(time_s)
     usual = float(np.median(steps)) if len(steps) else 0.0
-    breaks = np.flatnonzero((steps > GAP_PERIODS * usual) | (steps <= 0.0)) + 1
+    breaks = np.flatnonzero((steps > limits.GAP_PERIODS * usual) | (steps <= 0.0)) + 1
     yield from (slice(int(a), int(b)) for a, b in zip([0, *breaks], [*breaks, len(time_s)], strict=True))
 
 

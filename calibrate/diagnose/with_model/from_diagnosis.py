@@ -19,7 +19,7 @@ from calibrate.apply.predicting import as_fitted
 from calibrate.diagnose.doubts.diagnosis import UNKNOWN, Diagnosis, Finding
 from calibrate.diagnose.doubts.findings import named
 from calibrate.diagnose.from_recording import Diagnosed
-from calibrate.diagnose.gross_errors_first import Cleared
+from calibrate.diagnose.gross_errors import Cleared
 from calibrate.diagnose.search.bench import Bench
 from calibrate.diagnose.search.noise_law import curvature_of
 from calibrate.diagnose.search.stated_sizes import sizes_of

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.recording import Samples
+from calibrate.diagnose import limits
 from calibrate.diagnose.state.assumed import Assumed, Stated
 from calibrate.diagnose.state.fitted import (
     Fitted,
@@ -39,8 +40,6 @@ Floats = NDArray[np.float64]
 ANEW = ("device.", "camera.", "marker.", "encoder")  # set up or found again for each recording: nothing is known of it
 FOUND = ("tool", seat.POINTS)  # corrections about points that were found in closed form, in `about` of the model
 AXES = ("x", "y", "z")
-STRAIGHT = 1e-3  # m, rad or a factor: its square, over a metre, is a micrometre
-LOOSE = 1e3  # sigmas of an effect's value: never held beyond what the model states of it
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,7 +124,7 @@ def _later(model: ModelFile, session: Session) -> Fitted:
     scale = np.where(scale > 0.0, scale, np.sqrt(np.diag(covariance)))
     told = replace(session, stated=frozenset(known))
     own = at < len(session.parameters)
-    unit = np.where(own, np.minimum(scale, STRAIGHT), LOOSE * np.sqrt(np.diag(covariance)))
+    unit = np.where(own, np.minimum(scale, limits.STRAIGHT), limits.LOOSE * np.sqrt(np.diag(covariance)))
     return fit_from_model(told, geometry, terms, Assumed.of(at, start[at], covariance, scale), start, unit)
 
 

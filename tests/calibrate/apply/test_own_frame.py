@@ -10,7 +10,7 @@ import pytest
 from acquisition.recording import read
 from calibeam.notebook import Model
 from calibrate.apply.correct.corrected import Arms, Options
-from calibrate.diagnose.gross_errors_first import blunders_first
+from calibrate.diagnose.gross_errors import blunders_first
 from calibrate.diagnose.state.fitted import fit_geometry
 from calibrate.diagnose.state.session import session_of
 from calibrate.diagnose.with_model.from_diagnosis import model_of_fit

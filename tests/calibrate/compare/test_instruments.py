@@ -11,7 +11,7 @@ from acquisition.recording.samples import POSITION
 from calibeam.results.comparison import compare
 from calibrate.compare.chain import differences, of_rig
 from calibrate.compare.corrected import corrected_samples, simulated_of
-from calibrate.compare.seated import lengths_of
+from calibrate.compare.matched import lengths_of
 from calibrate.diagnose.state.fitted import fit_geometry
 from calibrate.diagnose.state.session import session_of
 from calibrate.model.arms.rig_arm import RigArm

@@ -3,7 +3,8 @@
 from calibrate.compare.streams import stream_differences
 from calibrate.diagnose.doubts.diagnosis import Named
 from calibrate.diagnose.streams.examine import StreamReport
-from calibrate.diagnose.streams.finding import Outcome, StreamFinding
+from calibrate.diagnose.streams.stream_findings import StreamFinding
+from calibrate.diagnose.streams.track import Outcome
 from calibrate.model.effects.term import Size
 
 

@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from acquisition.recording.rig import Rig
-from calibrate.diagnose.state.linearised import Rows, Unseen
+from calibrate.diagnose.state.linearised import UnseenRows, WhitenedRows
 from calibrate.model.effects.drivers import Drivers
 from calibrate.model.effects.ports import Place, Port
 from calibrate.model.effects.term import (
@@ -174,7 +174,7 @@ class LinearSession:
         return self.readings - full @ self.theta
 
     @cached_property
-    def rows(self) -> Rows:
+    def rows(self) -> WhitenedRows:
         g = self.geometry.shape[-1]
         scale = np.sqrt(self.weights)[:, None] / self.sigma
         residual = (scale * self._misfit[self.active]).ravel()
@@ -189,7 +189,7 @@ class LinearSession:
         priors = np.zeros((g, p))
         priors[range(g), range(g)] = np.sqrt(1e-3)
         none = np.full(g, -1)
-        return Rows(
+        return WhitenedRows(
             np.concatenate([residual, -np.sqrt(1e-3) * self.theta[:g]]),
             np.concatenate([slope, priors]),
             np.concatenate([np.repeat(self.active, k), none]),
@@ -217,9 +217,9 @@ class LinearSession:
         chosen = np.sort(samples)
         return replace(self, active=chosen, weights=self.weights[np.searchsorted(self.active, chosen)])
 
-    def held_out(self, samples) -> tuple[Unseen, ...]:
+    def held_out(self, samples) -> tuple[UnseenRows, ...]:
         misfit = self._misfit[np.sort(samples)]
-        return (Unseen("linear", np.sort(samples), misfit, misfit / self.sigma),)
+        return (UnseenRows("linear", np.sort(samples), misfit, misfit / self.sigma),)
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from acquisition.recording import read
 from benchmarks.real_diagnosis import apart, errors_m, rms_um, through_a_file
 from calibeam.results.diagnosis import diagnose_recording
 from calibeam.results.identification import identify_session, session_model
-from calibrate.diagnose.doubts.doubt import doubted
+from calibrate.diagnose.doubts.doubt import assessed
 from calibrate.diagnose.state.fitted import fit_geometry
 from calibrate.diagnose.state.session import session_of
 from calibrate.diagnose.with_model.from_diagnosis import model_of_diagnosis
@@ -39,7 +39,7 @@ def ratio(recording, fold, rng):
     block = np.arange(len(recording.samples)) * BLOCKS // len(recording.samples)
     unseen = np.flatnonzero(block % FOLDS == fold)
     alone = geometry.select(np.flatnonzero(block % FOLDS != fold)).refitted(())
-    found = doubted(alone, rng, missing_of(geometry.drivers)).at.state
+    found = assessed(alone, rng, missing_of(geometry.drivers)).at.state
     return misfit(found.held_out(unseen)) / misfit(alone.held_out(unseen))
 
 

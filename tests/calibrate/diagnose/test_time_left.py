@@ -5,7 +5,7 @@ import pytest
 
 from calibrate.diagnose.diagnose import diagnose
 from calibrate.diagnose.doubts.diagnosis import Verdict
-from calibrate.diagnose.doubts.proof import near_in_time
+from calibrate.diagnose.doubts.unseen_rows import near_in_time
 from calibrate.diagnose.search.bench import Bench
 from calibrate.diagnose.time_left import time_left
 

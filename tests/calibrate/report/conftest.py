@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 from acquisition.recording import Recording, Samples
 from acquisition.recording.rig import parse_rig, rig_sha256, rig_text
 from calibeam.results.identification import identify_session, session_model
-from calibrate.diagnose.gross_errors_first import blunders_first
+from calibrate.diagnose.gross_errors import blunders_first
 from calibrate.diagnose.state.fitted import fit_geometry
 from calibrate.diagnose.state.session import session_of
 from calibrate.diagnose.with_model.from_diagnosis import model_of_fit

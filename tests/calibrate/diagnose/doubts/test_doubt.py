@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from calibrate.diagnose.diagnose import diagnose
+from calibrate.diagnose.doubts.detection_limits import isolability
 from calibrate.diagnose.doubts.diagnosis import NAMED, UNKNOWN, Verdict
 from calibrate.diagnose.doubts.doubt import predicts
 from calibrate.diagnose.doubts.findings import findings_of
-from calibrate.diagnose.doubts.isolability import isolability
 from calibrate.diagnose.doubts.lack_of_fit import lack_of_fit
 from calibrate.diagnose.doubts.rivals import confidences, rivals_of
 from calibrate.diagnose.doubts.unrecorded import unrecorded

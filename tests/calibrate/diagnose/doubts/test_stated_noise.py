@@ -6,14 +6,9 @@ import numpy as np
 import pytest
 
 from acquisition.recording import read
+from calibrate.diagnose.doubts import limits
 from calibrate.diagnose.doubts.diagnosis import Verdict
-from calibrate.diagnose.doubts.stated_noise import (
-    MORE,
-    Statement,
-    close_pairs,
-    neighbours,
-    noise_found,
-)
+from calibrate.diagnose.doubts.stated_noise import Statement, close_pairs, neighbours, noise_found
 from calibrate.diagnose.from_recording import beyond_noise, diagnose_samples
 from calibrate.diagnose.state.fitted import fit_geometry
 from calibrate.diagnose.state.session import session_of
@@ -73,7 +68,7 @@ def test_no_statement_is_no_noise(tmp_path):
 def test_a_late_clock_without_the_speed_is_more_than_noise(tmp_path):
     one = found(tmp_path, seed=8, defects=("late-clock",), enr=10.0, withhold=True)
     assert one.statement is Statement.EXCEEDED
-    assert one.times > MORE
+    assert one.times > limits.MORE_THAN_STATED
     assert any("levers" in words for words in one.opposes)
     left = beyond_noise(one, (SPEED,))
     assert "× the stated noise of the positions" in left.why
@@ -142,6 +137,6 @@ def test_a_wrong_statement_is_seldom_taken_for_physics(noise, tmp_path):
 def test_hidden_speeds_are_never_called_noise(tmp_path):
     wanted = {"defects": ("late-clock",), "enr": 4.0, "withhold": True}
     cases = [found(tmp_path / str(i), seed=100 + i, **wanted) for i in range(CASES)]
-    beyond = [one for one in cases if one.times > MORE]
+    beyond = [one for one in cases if one.times > limits.MORE_THAN_STATED]
     assert len(beyond) >= CASES // 2
     assert sum(one.statement is not Statement.EXCEEDED for one in beyond) <= 1

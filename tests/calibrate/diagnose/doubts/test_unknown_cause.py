@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from calibrate.diagnose.doubts.doubt import doubted, predicts
+from calibrate.diagnose.doubts.doubt import assessed, predicts
 from calibrate.diagnose.doubts.findings import findings_of, pieces
 from calibrate.diagnose.doubts.unknown import cancel, with_unknowns
 from calibrate.diagnose.search.bench import Bench
@@ -181,7 +181,7 @@ def test_unseen_errors_are_those_of_leaving_rows_out(world):
 def test_what_explains_little_beside_an_unknown_cause_is_no_final_name(world):
     rng = np.random.default_rng(6)
     truth = [(world.at_joint(3, uneven), 8.0), (world.at_joint(2, lambda d: d.approach[:, 1]), 0.8)]
-    said = doubted(world.session(rng, truth), rng).findings
+    said = assessed(world.session(rng, truth), rng).findings
     assert said[0].name.physics == "unknown"
     small = [f for f in said if f.name.physics == "backlash"]
     assert small
@@ -218,7 +218,7 @@ def test_a_name_on_the_driver_of_an_unknown_cause_is_not_final(world):
     rng = np.random.default_rng(9)
     truth = [(world.at_joint(3, lambda d: np.tanh(d.q_rad[:, 1] * d.q_rad[:, 2])), 4.0)]
     truth.append((world.at_joint(2, lambda d: np.sin(d.q_rad[:, 1] + 0.4)), 3.0))
-    said = doubted(world.session(rng, truth), rng).findings
+    said = assessed(world.session(rng, truth), rng).findings
     assert said[0].name.physics == "unknown"
     beside = [f for f in said if f.name.physics == "encoder-eccentricity"]
     assert beside
@@ -260,7 +260,7 @@ def test_beside_a_great_cause_by_weight_a_slight_one_is_final_only_if_all_weight
     world, without_masses, lacking, sure
 ):
     session, rng = two_soft_joints(world)
-    said = doubted(session, rng, lacking).findings
+    said = assessed(session, rng, lacking).findings
     assert {f.name.where for f in said if f.name.physics == "joint-compliance"} == {"joint2.angle", "joint4.angle"}
     assert {f.name.where for f in said if f.confidence > 0.5} == sure
 
@@ -272,7 +272,7 @@ def test_a_weight_is_a_function_of_the_angles_of_an_unknown_cause_at_its_joint(w
     truth = [(world.at_joint(2, lambda d: np.tanh(3.0 * d.q_rad[:, 0] * d.q_rad[:, 2])), 4.0)]
     truth.append((world.at_joint(2, lambda d: torque["gravity_torque2"]), 4.0))
     session = world.session(rng, truth, extra=torque)
-    said = doubted(replace(session, terms=(*session.terms, weighed(2))), rng).findings
+    said = assessed(replace(session, terms=(*session.terms, weighed(2))), rng).findings
     assert {f.name.physics for f in said} == {"unknown", "joint-compliance"}
     assert all(f.confidence <= 0.5 for f in said if f.name.physics == "joint-compliance")
 
@@ -284,6 +284,6 @@ def test_a_slight_law_of_the_angle_beside_a_great_cause_by_weight_is_no_final_na
     truth = [(world.at_joint(2, lambda d: torque["gravity_torque2"]), 9.0)]
     truth += [(world.at_joint(joint, lambda d, i=joint: np.sin(d.q_rad[:, i - 1])), 1.2) for joint in (2, 3)]
     session = world.session(rng, truth, extra=torque)
-    said = doubted(replace(session, terms=(*session.terms, weighed(2))), rng).findings
+    said = assessed(replace(session, terms=(*session.terms, weighed(2))), rng).findings
     sure = {f.name.where: f.confidence > 0.5 for f in said if f.name.physics == "encoder-eccentricity"}
     assert sure == {"joint2.angle": False, "joint3.angle": True}

@@ -2,8 +2,9 @@
 
 import numpy as np
 
-from calibrate.diagnose.doubts.joint_scatter import UNEQUAL, innocent
-from calibrate.diagnose.doubts.unrecorded import RESTLESS, unrecorded
+from calibrate.diagnose.doubts import limits
+from calibrate.diagnose.doubts.joint_scatter import innocent
+from calibrate.diagnose.doubts.unrecorded import unrecorded
 from calibrate.diagnose.search.bench import Bench
 from calibrate.diagnose.search.noise_law import noise_law
 from calibrate.model.effects.term import Missing
@@ -47,7 +48,7 @@ def test_joints_that_repeat_unequally_well_lack_no_driver(world):
     for seed in range(SEEDS + 2):
         rng = np.random.default_rng(seed)
         every = tuple(range(1, world.session(rng).drivers.n_joints + 1))
-        sizes = np.exp(rng.uniform(0.0, np.log(UNEQUAL), len(every)))
+        sizes = np.exp(rng.uniform(0.0, np.log(limits.UNEQUAL_JOINTS), len(every)))
         session = scattered(world, rng, every, np.ones(world.samples), sizes)
         found.append(unrecorded(Bench(session), rng, (APPROACH, SPEED)))
     assert sum(f is not None for f in found) <= 1
@@ -59,9 +60,9 @@ def test_joints_that_scatter_at_some_samples_only_were_moving():
     moving = (rng.random(300) < 0.5) * rng.uniform(0.3, 1.5, 300)
     turned = rng.normal(size=(300, 6)) * moving[:, None]
     raw = rng.normal(size=(300, 3)) + np.einsum("jok,oj->ok", joints, turned)
-    assert innocent(raw, joints).restless > RESTLESS
+    assert innocent(raw, joints).restless > limits.RESTLESS
     heavy = rng.standard_t(3.0, (300, 1)) * rng.normal(size=(300, 3))
-    assert innocent(heavy, joints).restless < RESTLESS
+    assert innocent(heavy, joints).restless < limits.RESTLESS
 
 
 def test_innocent_scatter_is_whitened():
@@ -72,7 +73,7 @@ def test_innocent_scatter_is_whitened():
     white = np.einsum("oij,oj->oi", base.whitener, raw)
     assert base.through_joints
     assert np.allclose(white.T @ white / 400, np.eye(4), atol=0.2)
-    assert base.restless < RESTLESS
+    assert base.restless < limits.RESTLESS
 
 
 def test_a_step_of_the_fit_is_longer_than_the_least_squares_step(world):

@@ -8,7 +8,7 @@ import pytest
 from calibrate.diagnose.doubts.findings import named
 from calibrate.diagnose.doubts.pulled_back import picture_driver
 from calibrate.diagnose.streams.continuity import Fault
-from calibrate.diagnose.streams.to_file import EXPLAINS, USUAL
+from calibrate.diagnose.streams.streams_of_recording import EXPLAINS, USUAL
 from calibrate.model.effects.catalogue import EFFECTS, missing_of, terms_of
 from calibrate.model.effects.curve import causes_of
 from calibrate.model.effects.term import Shape

@@ -6,8 +6,8 @@ from scipy.stats import norm
 
 from calibrate.diagnose.search.bench import Bench
 from calibrate.diagnose.search.noise_law import noise_law
+from calibrate.diagnose.search.null import Tail
 from calibrate.diagnose.search.search import search
-from calibrate.diagnose.search.tail import Tail
 
 # Nominal 5 %; three binomial sigmas of 200 sets on top would be 9.6 %: the bounds are those of the requirement.
 MOST = {"white": 0.06, "heavy": 0.06, "wander": 0.08}

@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 from calibrate.diagnose.doubts.unknown import with_unknowns
+from calibrate.diagnose.search import limits
 from calibrate.diagnose.search.bench import Bench
 from calibrate.diagnose.search.search import search
-from calibrate.diagnose.search.searching import ALPHA_FURTHER, Search
+from calibrate.diagnose.search.searching import Search
 
 
 def sine(joint):
@@ -95,7 +96,7 @@ def test_every_term_that_stays_is_significant(world):
     rng = np.random.default_rng(8)
     found = search(world.session(rng, [(world.at_joint(2, sine(2)), 0.5), (world.at_joint(4, sine(4)), 0.4)]), rng)
     assert len(found.state.accepted) == 2
-    assert all(found.p[a.term.key] <= ALPHA_FURTHER for a in found.state.accepted)
+    assert all(found.p[a.term.key] <= limits.ALPHA_FURTHER for a in found.state.accepted)
 
 
 OUTSIDE = {

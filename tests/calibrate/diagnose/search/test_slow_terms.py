@@ -8,7 +8,7 @@ import pytest
 from calibrate.diagnose.search.bench import Bench
 from calibrate.diagnose.search.line_search import refined
 from calibrate.diagnose.search.pruning import fading
-from calibrate.diagnose.search.search import search, unswallowed
+from calibrate.diagnose.search.search import search, with_untrusted_step
 from calibrate.diagnose.search.searching import Search
 from calibrate.diagnose.state.fitted import fit_geometry
 from calibrate.diagnose.state.session import session_of
@@ -43,7 +43,7 @@ def test_a_step_over_ten_shots_is_found_though_robust_weights_swallow_it(world):
 def test_trusted_again_wild_rows_propose_the_step(world):
     rng = np.random.default_rng(3)
     session = slipped_for_ten_shots(world, rng)
-    found = unswallowed(Search(Bench(session), rng))
+    found = with_untrusted_step(Search(Bench(session), rng))
     assert found is not None
     (slipped,) = found.state.accepted
     assert slipped.term.key == slip(session, 2).key
@@ -57,7 +57,7 @@ def test_scattered_wild_rows_are_no_step(world):
         wild = rng.choice(len(session.readings), 10, replace=False)
         readings = session.readings.copy()
         readings[wild] += 25.0 * rng.choice([-1.0, 1.0], (10, readings.shape[1]))
-        assert unswallowed(Search(Bench(world.with_readings(session, readings)), rng)) is None
+        assert with_untrusted_step(Search(Bench(world.with_readings(session, readings)), rng)) is None
 
 
 @pytest.mark.parametrize(

@@ -2,10 +2,11 @@
 
 import numpy as np
 
-from calibrate.diagnose.doubts.doubt import MOST, thinned
+from calibrate.diagnose.doubts import limits
+from calibrate.diagnose.doubts.doubt import thinned
 from tests.calibrate.diagnose.conftest import World
 
-SAMPLES = MOST // World().channels  # of so many rows each
+SAMPLES = limits.MOST_ROWS // World().channels  # of so many rows each
 
 
 def test_a_short_session_is_searched_whole():

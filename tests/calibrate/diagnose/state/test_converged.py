@@ -3,14 +3,10 @@
 import numpy as np
 import pytest
 
+from calibrate.diagnose import limits
 from calibrate.diagnose.search.bench import Bench
 from calibrate.diagnose.search.line_search import solved
-from calibrate.diagnose.state.fitted import (
-    AT_REST,
-    SETTLED,
-    _turn,
-    fit_geometry,
-)
+from calibrate.diagnose.state.fitted import AT_REST, _turn, fit_geometry
 from calibrate.diagnose.state.in_sight import in_sight
 from calibrate.diagnose.state.session import session_of
 from calibrate.fit.solvers import Stop
@@ -72,16 +68,16 @@ def test_settled_is_said_only_where_the_solver_is_at_rest(geometry):
         assert state.stop is Stop.LIKELIHOOD
         again = _turn(state.problem, state.active, state.values, state.noise)
         assert again.stop in AT_REST
-        assert again.minus_two_log_likelihood == pytest.approx(state.minus_two_log_likelihood, abs=SETTLED)
+        assert again.minus_two_log_likelihood == pytest.approx(state.minus_two_log_likelihood, abs=limits.SETTLED)
 
 
 def test_a_refit_never_ends_worse_than_its_start(geometry):
     """Of its own terms from its own values, and with a term more."""
     state = with_terms(geometry, ("encoder-eccentricity", "joint2.angle"))
-    assert state.refitted(state.accepted).minus_two_log_likelihood <= state.minus_two_log_likelihood + SETTLED
+    assert state.refitted(state.accepted).minus_two_log_likelihood <= state.minus_two_log_likelihood + limits.SETTLED
     for term in (("axis-wobble", "link3.tilt"), ("joint-coupling", "joint4.angle")):
         more = with_terms(state, term)
-        assert more.minus_two_log_likelihood <= state.minus_two_log_likelihood + SETTLED
+        assert more.minus_two_log_likelihood <= state.minus_two_log_likelihood + limits.SETTLED
 
 
 def test_a_bracket_that_gives_way_alike_is_a_device_that_stands_lower(geometry):

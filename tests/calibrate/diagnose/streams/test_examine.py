@@ -9,9 +9,8 @@ import pytest
 from benchmarks.stream_cases import servo_scene, sway_rad
 from benchmarks.stream_devices import EPOCHS_S, delivered, devices_of_scene
 from calibrate.diagnose.streams.examine import examine
-from calibrate.diagnose.streams.settling import Window
-from calibrate.diagnose.streams.stands import stands_of
-from calibrate.diagnose.streams.to_file import USUAL
+from calibrate.diagnose.streams.settling import Window, stands_of
+from calibrate.diagnose.streams.streams_of_recording import USUAL
 from calibrate.diagnose.streams.track import Track
 
 

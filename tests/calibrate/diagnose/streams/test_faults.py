@@ -8,13 +8,11 @@ import pytest
 from benchmarks import streams
 from benchmarks.stream_cases import servo_scene
 from calibrate.diagnose.streams.continuity import Fault, breaks
-from calibrate.diagnose.streams.finding import Outcome
 from calibrate.diagnose.streams.following import following
 from calibrate.diagnose.streams.ringing import ringing
-from calibrate.diagnose.streams.settling import Window, unsettled
+from calibrate.diagnose.streams.settling import Window, stands_of, unsettled
 from calibrate.diagnose.streams.slips import slips
-from calibrate.diagnose.streams.stands import stands_of
-from calibrate.diagnose.streams.track import Track
+from calibrate.diagnose.streams.track import Outcome, Track
 
 
 @pytest.mark.parametrize("seed", [1, 2])

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from benchmarks.stream_cases import servo_scene
+from calibrate.diagnose.streams.settling import stands_of
 from calibrate.diagnose.streams.slips import slips
-from calibrate.diagnose.streams.stands import stands_of
 
 SOFT_JOINT, SLIPPED_JOINT = 1, 2  # from 0
 SOFT_RAD = 4e-4  # at the largest torque: 8 urad/Nm under 50 Nm

@@ -15,7 +15,7 @@ from scipy.linalg import block_diag
 from acquisition.recording import Samples, read
 from acquisition.recording.rig import parse_rig
 from calibrate.apply.predicting import as_fitted, predict_with_physics
-from calibrate.diagnose.gross_errors_first import Cleared
+from calibrate.diagnose.gross_errors import Cleared
 from calibrate.diagnose.state.fitted import fit_geometry
 from calibrate.diagnose.state.session import session_of
 from calibrate.diagnose.with_model.from_diagnosis import model_of_fit

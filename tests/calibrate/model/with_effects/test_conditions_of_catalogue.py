@@ -15,7 +15,7 @@ import pytest
 
 from acquisition.recording import Samples, read
 from calibrate.apply.predicting import predict_with_physics
-from calibrate.diagnose.gross_errors_first import Cleared
+from calibrate.diagnose.gross_errors import Cleared
 from calibrate.diagnose.state.fitted import fit_geometry
 from calibrate.diagnose.state.session import session_of
 from calibrate.diagnose.with_model.from_diagnosis import model_of_fit

@@ -16,7 +16,7 @@ from scipy.linalg import block_diag
 
 from acquisition.recording import read
 from calibrate.apply.predicting import predict_with_physics
-from calibrate.diagnose.gross_errors_first import Cleared
+from calibrate.diagnose.gross_errors import Cleared
 from calibrate.diagnose.search.bench import Bench
 from calibrate.diagnose.search.port_process import places_of
 from calibrate.diagnose.state.fitted import fit_geometry

@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from calibrate.diagnose.doubts.free_space_change import AMONG, free_space_change
+from calibrate.diagnose.doubts import limits
+from calibrate.diagnose.doubts.free_space_change import free_space_change
 from calibrate.diagnose.new_poses.longer_session import NewPoses, elsewhere
 from calibrate.diagnose.state.fitted import fit_geometry
 from calibrate.diagnose.state.session import session_of
@@ -45,7 +46,7 @@ def kinds_of(state):
 def test_every_cause_is_told_where_it_was_measured_as_it_was_there(fitted):
     drivers, rng = fitted.drivers, np.random.default_rng(3)
     again = rng.choice(len(drivers.q_rad), AGAIN, replace=False)
-    copies = int(AMONG * AGAIN / len(drivers.q_rad))
+    copies = int(limits.POSES_FOR_ONE_NEW * AGAIN / len(drivers.q_rad))
     longer = extended(drivers, drivers.q_rad[again], drivers.frames[again], again, copies)
     kinds = kinds_of(fitted)
     assert len(kinds) > 15

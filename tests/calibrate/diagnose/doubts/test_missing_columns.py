@@ -10,7 +10,7 @@ from calibrate.diagnose.doubts.diagnosis import (
     Named,
     RivalName,
 )
-from calibrate.diagnose.doubts.drifts import doubtful, suspects, untold
+from calibrate.diagnose.doubts.missing_columns import doubtful, suspects, untold
 from calibrate.model.effects.term import Missing
 
 WARMTH = (Missing("temp", "temp_<where>_degC", "link-thermal-growth"),)

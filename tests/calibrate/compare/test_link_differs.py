@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from calibrate.compare.own_noise import chance_of_structure, scatter_of
+from calibrate.compare.link_differs import chance_of_structure, scatter_of
 
 
 @pytest.fixture

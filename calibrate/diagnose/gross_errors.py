@@ -2,6 +2,11 @@
 
 Other than before an identification, what moved or drifted stays in: it is the very thing that is sought. Only where
 something stands farther off than any bump moves it (model/effects/moved.py), rows are those of another session.
+
+Rows of an instrument that stand apart from all others, and whether that is a gross error or physics.
+
+A wrong digit stands alone and far off, with nothing between it and the rest; physics makes residuals of all sizes, or
+moves rows that follow one another. So only few, single rows behind a gap are gross errors before physics is sought.
 """
 
 from dataclasses import dataclass, replace
@@ -13,12 +18,7 @@ from scipy.spatial.transform import Rotation
 from acquisition.recording import Samples
 from acquisition.recording.rig import Rig
 from acquisition.recording.samples import POSITION, SEAT
-from calibrate.diagnose.outlying_rows import (
-    FEWEST_ROWS,
-    alone,
-    behind_gap,
-    lasting,
-)
+from calibrate.diagnose import limits
 from calibrate.diagnose.state.session import Session, session_of
 from calibrate.fit.gross_errors import bad_rows
 from calibrate.fit.identify.clean import refuse_most, rows_of
@@ -27,10 +27,20 @@ from calibrate.fit.identify.rounds import distances, wary_fit
 from calibrate.fit.identify.session import columns_of, shots_of
 from calibrate.model.alignment import rigid_motion
 from calibrate.model.arms.catalogue import arm_of
-from calibrate.model.checks.gross_error import GrossError, GrossErrorKind, Shots, err_alike, postures
+from calibrate.model.checks.gross_error import (
+    LIMIT,
+    GrossError,
+    GrossErrorKind,
+    Shots,
+    err_alike,
+    outlying,
+    postures,
+    robust_scale,
+    runs_of,
+)
 from calibrate.model.checks.rough_fit import rough_fit, sessions_apart
 from calibrate.model.checks.witness import by_target
-from calibrate.model.effects.moved import LIMIT
+from calibrate.model.effects.moved import LIMIT as MOVED_LIMIT
 from calibrate.model.parameters import start_values
 from calibrate.model.problem import Measured
 from calibrate.model.sensors.catalogue import kind_of
@@ -38,8 +48,60 @@ from calibrate.model.sensors.encoder_difference import NAME as ENCODER_DIFFERENC
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
+Bools = NDArray[np.bool_]
 
-PASSES = 2  # a row can hide behind a worse one
+
+def alone(distance: Floats, k: int, place: Ints) -> Ints:
+    """Observations to leave out before physics is sought.
+
+    `distance` (obs,) whitened misfit over k coordinates in the order they were taken; `place` (obs,) where the fixture
+    or the probe stood, -1 where that is no question.
+    """
+    apart = behind_gap(distance, k)
+    if not 0 < int(apart.sum()) <= max(limits.OUTLYING_COUNT, limits.OUTLYING_SHARE * len(distance)):
+        return np.zeros(0, dtype=np.intp)
+    return np.flatnonzero(apart & ~lasting(apart, place))
+
+
+def behind_gap(distance: Floats, k: int) -> Bools:
+    """(obs,) farther than any noise, and with a gap to all that are nearer."""
+    order = np.argsort(distance)
+    size = np.maximum(distance[order], robust_scale(distance, k))
+    after_gap = (size[1:] > limits.GAP * size[:-1]) & (size[1:] > LIMIT * robust_scale(distance, k))
+    out = np.zeros(len(distance), dtype=bool)
+    if len(distance) >= limits.FEWEST_OF_INSTRUMENT and after_gap.any():
+        out[order[int(np.argmax(after_gap)) + 1 :]] = True
+    return out
+
+
+def lasting(apart: Bools, place: Ints) -> Bools:
+    """(obs,) of those apart the ones that follow one another, among all rows or among those of one place."""
+    out = _in_runs(apart)
+    for one in np.unique(place):
+        mine = np.flatnonzero(place == one)
+        out[mine] |= _in_runs(apart[mine])
+    return out
+
+
+def unexplained_rows(whitened: Floats) -> Ints:
+    """Observations (obs, k) that no model explains; none where they are so many that it is the model which is wrong."""
+    distance = np.linalg.norm(whitened, axis=1)
+    bad = np.flatnonzero(outlying(distance, whitened.shape[1]))
+    return (
+        bad
+        if len(bad) <= max(limits.OUTLYING_COUNT, limits.OUTLYING_SHARE * len(distance))
+        else np.zeros(0, dtype=np.intp)
+    )
+
+
+def _in_runs(apart: Bools) -> Bools:
+    out = np.zeros(len(apart), dtype=bool)
+    for first, last in runs_of(np.flatnonzero(apart).tolist()):
+        if last - first + 1 >= limits.OUTLYING_RUN:
+            out[first : last + 1] = True
+    return out
+
+
 PLACES = ("placement", SEAT)
 
 
@@ -63,7 +125,7 @@ def blunders_first(rig: Rig, samples: Samples) -> Cleared:
         return Cleared(samples, np.zeros(0, dtype=np.intp), wrong)
     blunders = [*impossible_rows(rig, samples), *_joined(rig, samples)]
     kept = _kept(samples, blunders)
-    for _ in range(PASSES):
+    for _ in range(limits.OUTLYING_PASSES):
         found = [_counted(blunder, kept) for blunder in _wild(session_of(rig, samples.take(kept)))]
         if not found:
             break
@@ -120,7 +182,7 @@ def _elsewhere(expected: Floats, observed: Floats, block: NDArray[np.bool_]) -> 
     linear, shift_m = T_observed_expected[:3, :3], T_observed_expected[:3, 3]
     middle = expected[block].mean(axis=0)
     moved_m = float(np.linalg.norm(linear @ middle + shift_m - middle))
-    return max(moved_m, float(Rotation.from_matrix(linear).magnitude())) > LIMIT
+    return max(moved_m, float(Rotation.from_matrix(linear).magnitude())) > MOVED_LIMIT
 
 
 def _wild(session: Session) -> list[GrossError]:
@@ -131,7 +193,7 @@ def _wild(session: Session) -> list[GrossError]:
     out: list[GrossError] = []
     every = zip(session.measured, distances(problem, theta), strict=False)  # known lengths come last and are no rows
     for index, (measured, distance) in enumerate(every):
-        if measured.problem.rows < FEWEST_ROWS or measured.name == ENCODER_DIFFERENCE:
+        if measured.problem.rows < limits.FEWEST_OF_INSTRUMENT or measured.name == ENCODER_DIFFERENCE:
             continue
         k = measured.problem.observed.shape[1]
         own = problem.of_block(index, theta)
@@ -171,7 +233,7 @@ def _blocks(measured: Measured, block: Ints, away_m: Floats, limit_m: float) -> 
 
 def _limit_m(session: Session, measured: Measured) -> float:
     """Beyond, no bump has moved a reading."""
-    return min(LIMIT, kind_of(measured.name).far_m(session.rig))
+    return min(MOVED_LIMIT, kind_of(measured.name).far_m(session.rig))
 
 
 def _pair(measured: Measured, i: int, away_m: float) -> GrossError:

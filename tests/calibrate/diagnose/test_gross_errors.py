@@ -1,9 +1,11 @@
-"""Faults of a file are named before physics is sought, and what physics did is not taken for a fault."""
+"""Faults of a file are named before physics is sought, and what physics did is not taken for a fault. Single outlying
+rows are gross errors; whatever lasts, or has all sizes, is left to physics.
+"""
 
 import numpy as np
 import pytest
 
-from calibrate.diagnose.gross_errors_first import blunders_first
+from calibrate.diagnose.gross_errors import alone, blunders_first, unexplained_rows
 from calibrate.errors import DataError
 from calibrate.model.checks.gross_error import GrossErrorKind
 from tests.calibrate.diagnose.concealed import changed, recording_of
@@ -63,3 +65,53 @@ def test_half_a_file_of_impossible_rows_is_refused(healthy):
     doubled = healthy.samples.take(np.repeat(np.arange(120), 2))
     with pytest.raises(DataError, match="of 240 rows"):
         blunders_first(healthy.rig, doubled)
+
+
+NOWHERE = np.full(200, -1)
+
+
+@pytest.fixture
+def quiet():
+    """Whitened misfits over three coordinates of 200 rows."""
+    return np.linalg.norm(np.random.default_rng(3).normal(size=(200, 3)), axis=1)
+
+
+def test_wrong_digits_here_and_there_are_found(quiet):
+    quiet[[17, 90, 151]] = (400.0, 60.0, 9e4)
+    np.testing.assert_array_equal(alone(quiet, 3, NOWHERE), [17, 90, 151])
+
+
+def test_noise_alone_has_no_wild_row(quiet):
+    assert len(alone(quiet, 3, NOWHERE)) == 0
+
+
+def test_a_step_that_lasts_is_no_blunder(quiet):
+    quiet[193:] += 500.0
+    assert len(alone(quiet, 3, NOWHERE)) == 0
+
+
+def test_a_moved_place_is_no_blunder_though_its_rows_are_scattered_over_the_session(quiet):
+    place = np.arange(200) % 25
+    moved = (place == 4) & (np.arange(200) > 120)
+    quiet[moved] += 500.0
+    assert len(alone(quiet, 3, place)) == 0
+    assert len(alone(quiet, 3, NOWHERE)) == moved.sum()  # without the place nobody can know
+
+
+def test_physics_of_all_sizes_hides_no_gap(quiet):
+    rows = np.arange(0, 200, 25)
+    quiet[rows] += 12.0 * 1.9 ** np.arange(len(rows))
+    assert len(alone(quiet, 3, NOWHERE)) == 0
+
+
+def test_a_tenth_of_the_rows_is_no_accident(quiet):
+    quiet[::10] += 1000.0
+    assert len(alone(quiet, 3, NOWHERE)) == 0
+
+
+def test_rows_that_no_model_explains_are_told_unless_the_model_is_wrong():
+    whitened = np.random.default_rng(1).normal(size=(200, 3))
+    whitened[33] = 80.0
+    np.testing.assert_array_equal(unexplained_rows(whitened), [33])
+    whitened[::8] = 80.0
+    assert len(unexplained_rows(whitened)) == 0

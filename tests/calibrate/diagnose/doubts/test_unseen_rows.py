@@ -5,14 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from calibrate.diagnose.doubts.folds import (
-    FEWEST,
-    FOLDS,
-    blocks,
-    regions,
-    splits_of,
-    units,
-)
+from calibrate.diagnose.doubts import limits
+from calibrate.diagnose.doubts.unseen_rows import blocks, regions, splits_of, units
 
 
 def random_split(world, samples):
@@ -26,7 +20,7 @@ def test_a_small_session_is_proved_on_several_shares_in_turn(world, samples):
     folds = random_split(world, samples).unseen
     left_out = np.concatenate(folds)
     assert len(folds) > 1
-    assert FEWEST <= len(left_out) == len(np.unique(left_out))
+    assert limits.FEWEST_LEFT_OUT <= len(left_out) == len(np.unique(left_out))
     assert all(len(fold) <= samples / 4 for fold in folds)
 
 
@@ -71,7 +65,7 @@ def test_folds_of_blocks_in_time_are_of_one_size_however_few_samples(world, samp
     drivers = world.session(np.random.default_rng(4)).drivers
     drivers = replace(drivers, t_s=drivers.t_s[:samples], repeat=None)
     block = blocks(drivers)
-    assert np.ptp(np.bincount(block % FOLDS)) <= FOLDS
+    assert np.ptp(np.bincount(block % limits.FOLDS)) <= limits.FOLDS
     assert np.bincount(block).min() >= 3  # a single one is half seen by its neighbours
 
 

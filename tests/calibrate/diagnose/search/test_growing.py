@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from calibrate.diagnose.search.bench import Bench
-from calibrate.diagnose.search.proposals import proposals
+from calibrate.diagnose.search.growing import proposals
 
 
 def slips(session):

@@ -1,19 +1,36 @@
 """What the finders found, as findings with the words of docs/formats.md."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from calibrate.diagnose.doubts.diagnosis import Named
+from calibrate.diagnose.streams import limits
+from calibrate.diagnose.streams.clock_faults import Late
 from calibrate.diagnose.streams.continuity import Break, Fault
-from calibrate.diagnose.streams.finding import Outcome, StreamFinding
 from calibrate.diagnose.streams.following import Following
-from calibrate.diagnose.streams.lateness import Late
 from calibrate.diagnose.streams.ringing import Ringing
 from calibrate.diagnose.streams.settling import Unsettled, Window
 from calibrate.diagnose.streams.slips import Slip
-from calibrate.diagnose.streams.track import Track
+from calibrate.diagnose.streams.track import Outcome, Track
 from calibrate.model.effects.term import Size, with_sigma
+
+
+@dataclass(frozen=True)
+class StreamFinding:
+    """One cause in a stream. `p`: of nothing at all looking like this; times on the clock of the named stream."""
+
+    name: Named
+    stream: str
+    outcome: Outcome
+    parameters: Mapping[str, Size]
+    from_s: float | None
+    to_s: float | None
+    p: float
+    says: str
+    rivals: tuple[Named, ...] = ()
+
 
 SAID = {
     Fault.MISSED: "{n} samples of {stream} are missing at {at}",
@@ -23,10 +40,9 @@ SAID = {
     Fault.FROZEN: "{n} samples of {stream} are one and the same{of}, while it moved, at {at}",
 }
 CERTAIN = float(np.finfo(float).tiny)  # of what was counted: no noise does it, and no probability is zero
-MOST = 8  # rows that are printed one by one
 
 
-def told_breaks(track: Track, faults: Sequence[Break]) -> list[StreamFinding]:
+def break_findings(track: Track, faults: Sequence[Break]) -> list[StreamFinding]:
     """One finding for each kind of fault and each joint that it struck, however often."""
     kinds: dict[tuple[Fault, str, str], list[Break]] = {}
     for one in faults:
@@ -35,10 +51,10 @@ def told_breaks(track: Track, faults: Sequence[Break]) -> list[StreamFinding]:
             where = f"joint{one.channels[0] + 1}.angle"
             of = " at joint " + ", ".join(str(c + 1) for c in one.channels)
         kinds.setdefault((one.fault, where, of), []).append(one)
-    return [_told_kind(track, *kind, alike) for kind, alike in kinds.items()]
+    return [_break_finding(track, *kind, alike) for kind, alike in kinds.items()]
 
 
-def _told_kind(track: Track, fault: Fault, where: str, of: str, alike: list[Break]) -> StreamFinding:
+def _break_finding(track: Track, fault: Fault, where: str, of: str, alike: list[Break]) -> StreamFinding:
     worst = max(alike, key=lambda one: (one.samples, abs(one.jump_s)))
     n, places = sum(one.samples for one in alike), len(alike)
     at = f"{alike[0].from_s:.3f} s" + (f" and {places - 1} more times, most at {worst.from_s:.3f} s" * (places > 1))
@@ -50,7 +66,7 @@ def _told_kind(track: Track, fault: Fault, where: str, of: str, alike: list[Brea
     return StreamFinding(name, track.name, Outcome.FOUND, sizes, alike[0].from_s, alike[-1].to_s, CERTAIN, says)
 
 
-def told_late(device: str, late: Late, joints: int) -> StreamFinding:
+def late_finding(device: str, late: Late, joints: int) -> StreamFinding:
     sizes = {"latency_s": Size(late.late_s, late.sigma_s)}
     way = "later" if late.late_s >= 0.0 else "earlier"
     says = f"{device} carry times {with_sigma(1e3 * abs(late.late_s), 1e3 * late.sigma_s)} ms {way} than the joints'"
@@ -62,7 +78,7 @@ def told_late(device: str, late: Late, joints: int) -> StreamFinding:
     return StreamFinding(name, device, Outcome.FOUND, sizes, None, None, max(late.p, CERTAIN), says)
 
 
-def told_unsettled(track: Track, windows: Sequence[Window], each: Sequence[Unsettled], joints: int) -> StreamFinding:
+def unsettled_finding(track: Track, windows: Sequence[Window], each: Sequence[Unsettled], joints: int) -> StreamFinding:
     """Of those that were found unsettled, all together. ValueError for none."""
     found = [(k, window, one) for k, (window, one) in enumerate(zip(windows, each, strict=True)) if _is_found(one)]
     if not found:
@@ -74,7 +90,9 @@ def told_unsettled(track: Track, windows: Sequence[Window], each: Sequence[Unset
     for name, values in (("left_share", share), ("tau_s", tau_s)):
         if len(values):
             sizes[name] = Size(float(np.median(values)), float(np.std(values) / np.sqrt(len(values))))
-    rows = ", ".join(str(k + 1) for k, _, _ in found[:MOST]) + (", ..." if len(found) > MOST else "")
+    rows = ", ".join(str(k + 1) for k, _, _ in found[: limits.PRINTED_ROWS]) + (
+        ", ..." if len(found) > limits.PRINTED_ROWS else ""
+    )
     says = (
         f"{len(found)} of {len(windows)} samples (rows {rows}) were taken before the arm had settled: "
         f"up to {1e6 * largest:.3g} µ{track.unit} of the {track.name} were still to come"
@@ -94,7 +112,7 @@ def _sigma(one: Unsettled) -> float:
     return 0.0 if one.sigma is None else float(np.max(one.sigma))
 
 
-def told_following(one: Following) -> StreamFinding:
+def following_finding(one: Following) -> StreamFinding:
     name = Named(f"joint{one.joint}.angle", (f"qd{one.joint}",), "linear", None, "following-error")
     gain = "" if one.velocity_gain_per_s is None else f" (velocity gain {one.velocity_gain_per_s:.4g} 1/s)"
     kind = "" if one.kind == "undetermined" else f", like a {one.kind}"
@@ -103,7 +121,7 @@ def told_following(one: Following) -> StreamFinding:
     return StreamFinding(name, "joints", Outcome.FOUND, _behind(one), None, None, max(one.p, CERTAIN), says)
 
 
-def told_reading_lag(one: Following) -> StreamFinding:
+def reading_lag_finding(one: Following) -> StreamFinding:
     name = Named(f"joint{one.joint}.angle", (f"qd{one.joint}",), "linear", None, "reading-lag")
     kind = "" if one.kind == "undetermined" else f", like a {one.kind}"
     way = "later" if (one.behind_s or 0.0) >= 0.0 else "earlier"
@@ -111,7 +129,7 @@ def told_reading_lag(one: Following) -> StreamFinding:
     return StreamFinding(name, "encoders", Outcome.FOUND, _behind(one), None, None, max(one.p, CERTAIN), says)
 
 
-def told_slip(one: Slip) -> StreamFinding:
+def slip_finding(one: Slip) -> StreamFinding:
     name = Named(f"joint{one.joint}.angle", ("t",), "step", None, "encoder-slip")
     sizes = {"slip_rad": Size(one.size_rad, one.sigma_rad), "time_s": Size(one.to_s, one.to_s - one.from_s)}
     says = (
@@ -121,7 +139,7 @@ def told_slip(one: Slip) -> StreamFinding:
     return StreamFinding(name, "encoders", Outcome.FOUND, sizes, one.from_s, one.to_s, max(one.p, CERTAIN), says)
 
 
-def told_ringing(track: Track, one: Ringing) -> StreamFinding:
+def ringing_finding(track: Track, one: Ringing) -> StreamFinding:
     """ValueError where nothing rings."""
     if one.frequency_hz is None or one.damping is None or one.amplitude is None:
         raise ValueError(f"{track.name}: nothing rings ({one.outcome.value})")
