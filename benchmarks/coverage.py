@@ -14,7 +14,7 @@ from calibrate.fit.rank.identifiability import Identifiability, analyse
 from calibrate.fit.rank.observability import analyse_along, reduced
 from calibrate.fit.solvers import NEAR_START, Fit, solve
 from calibrate.model.arms.catalogue import arm_of
-from calibrate.model.chain import Chain
+from calibrate.model.chain import SensorChain
 from calibrate.model.dual_psd_rig import dual_psd_chain
 from calibrate.model.placement import Device, Target
 from calibrate.model.problem import Problem
@@ -59,7 +59,7 @@ def run(rig_file: Path, sessions: int = 1000, seed: int = 40_000) -> Tally:
     """Tracker and dual-PSD sessions in turn, that many in all, each with a truth of its own."""
     bench, rng, tally = Bench(rig_file), np.random.default_rng(seed), Tally()
     rig = load_rig(rig_file)
-    tracker = Chain(arm_of(rig), Position(Target(TARGET_M), Device(transform(*T_BASE_DEVICE))))
+    tracker = SensorChain(arm_of(rig), Position(Target(TARGET_M), Device(transform(*T_BASE_DEVICE))))
     for number in range(sessions):
         if number % 2 == 0:
             session = bench.tracker(rng)
@@ -71,7 +71,7 @@ def run(rig_file: Path, sessions: int = 1000, seed: int = 40_000) -> Tally:
     return tally
 
 
-def identified(chain: Chain, session: Session, sigma_m: float) -> tuple[Fit, Identifiability]:
+def identified(chain: SensorChain, session: Session, sigma_m: float) -> tuple[Fit, Identifiability]:
     """Fit, and again with what the data do not see there removed, until that stands (in two rounds, seldom three)."""
     n, k = session.observed.shape
     whitener = np.tile(np.eye(k) / sigma_m, (n, 1, 1))

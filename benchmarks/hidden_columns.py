@@ -31,7 +31,7 @@ from calibrate.diagnose.record.schema import CurveRecord, DiagnosisFile
 from calibrate.diagnose.state.fitted import Fitted, fit_geometry
 from calibrate.diagnose.state.session import session_of
 from calibrate.errors import DataError
-from calibrate.model.chain import Chain
+from calibrate.model.chain import SensorChain
 from calibrate.quantities import DASH, angle, length
 from calibrate.report.diagnosis.diagnosis_page import write_diagnosis_report
 from calibrate.report.diagnosis.words import verdict_words
@@ -126,11 +126,11 @@ def hidden_angles(recording: Recording) -> tuple[HiddenAngle, ...]:
     return tuple(_hidden(known, test, joint, misfit) for joint in range(known.session.arm.n_joints))
 
 
-def _at(state: Fitted, samples: Ints) -> tuple[Chain, Floats, Floats, Floats]:
+def _at(state: Fitted, samples: Ints) -> tuple[SensorChain, Floats, Floats, Floats]:
     """The first instrument at these samples: chain, values of its parameters, what it saw, joint readings."""
     measured = state.session.measured[0]
     chain = measured.problem.chain
-    if not isinstance(chain, Chain):
+    if not isinstance(chain, SensorChain):
         raise DataError("the first instrument of this session sees pairs of poses; hide an angle from another one")
     rows = np.flatnonzero(np.isin(measured.sample_rows[:, -1], samples))
     values = state.session.weighting.unweighted.of_block(0, state.geometry)
@@ -164,7 +164,7 @@ def _hidden(state: Fitted, test: Ints, joint: int, misfit: float) -> HiddenAngle
 
 
 def _inferred(
-    chain: Chain, values: Floats, observed: Floats, q_rad: Floats, joint: int, limits: tuple[float, float]
+    chain: SensorChain, values: Floats, observed: Floats, q_rad: Floats, joint: int, limits: tuple[float, float]
 ) -> Floats:
     """(pose,) the angle that fits best: the best of a grid, then Gauss-Newton."""
     grid = np.linspace(*limits, STARTS)

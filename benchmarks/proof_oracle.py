@@ -44,7 +44,7 @@ from calibrate.diagnose.state.fitted import (
 )
 from calibrate.diagnose.state.linearised import (
     Accepted,
-    UnseenRows,
+    UnseenMisfits,
 )
 from calibrate.diagnose.state.session import (
     session_of,
@@ -139,7 +139,7 @@ def _is_said(term: Term, finding: FindingRecord) -> bool:
     return (name.where, ",".join(name.depends_on), name.shape, name.order, name.physics) == said
 
 
-def misfit_m(unseen: Sequence[UnseenRows], wild: NDArray[np.bool_] | None = None) -> Floats:
+def misfit_m(unseen: Sequence[UnseenMisfits], wild: NDArray[np.bool_] | None = None) -> Floats:
     """(reading,) lengths that a model misses on unseen samples, wild ones left out."""
     lengths = [u.misfit for u in unseen if u.instrument != ENCODER_DIFFERENCE]
     parts = [misfit[:, :LENGTHS] if misfit.shape[1] > 4 else misfit for misfit in lengths]
@@ -208,12 +208,12 @@ class _Rest:
     """What everybody is measured by."""
 
     fold: Fold
-    plain: tuple[UnseenRows, ...]  # misses of geometry alone
+    plain: tuple[UnseenMisfits, ...]  # misses of geometry alone
     wild: NDArray[np.bool_]
     before_m: float
     oracle_m: float
 
-    def score(self, method: str, left: Sequence[UnseenRows], says: str) -> BaselineScore:
+    def score(self, method: str, left: Sequence[UnseenMisfits], says: str) -> BaselineScore:
         rms = rms_m(misfit_m(left, self.wild))
         return BaselineScore(method, rms, _gain(rms, self.before_m, self.oracle_m), says)
 
@@ -230,13 +230,13 @@ def _diagnosed(state: Fitted, file: DiagnosisFile, rest: _Rest) -> list[Baseline
 def _rival(method: Method, rest: _Rest) -> BaselineScore:
     """Each instrument learnt by itself, in sigmas of its own."""
     X, names = features(rest.fold.geometry)
-    left: list[UnseenRows] = []
+    left: list[UnseenMisfits] = []
     says = ""
     for seen, unseen in zip(rest.fold.geometry.held_out(rest.fold.train), rest.plain, strict=True):
         scale = sigma_about_zero(seen.misfit, axis=0)
         learnt = method.learn(X[seen.sample], _tame(seen.misfit / scale), X[unseen.sample], names)
         missed = unseen.misfit - learnt.predicted * scale
-        left.append(UnseenRows(unseen.instrument, unseen.sample, missed, unseen.whitened))
+        left.append(UnseenMisfits(unseen.instrument, unseen.sample, missed, unseen.whitened))
         says = says or learnt.says
     return rest.score(method.name, left, says)
 

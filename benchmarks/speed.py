@@ -33,7 +33,7 @@ from calibrate.fit.solvers import NEAR_START, Fit, solve
 from calibrate.model.arms import compiled
 from calibrate.model.arms.catalogue import arm_of
 from calibrate.model.arms.serial import SerialArm
-from calibrate.model.chain import Chain
+from calibrate.model.chain import SensorChain
 from calibrate.model.observations import Observations
 from calibrate.model.parameters import hold, plausible_sizes
 from calibrate.model.placement import Device, Target
@@ -140,7 +140,7 @@ def _numpy_jacobian(arm: SerialArm, theta: Floats, q_rad: Floats) -> Floats:
 def tracker_problem(rig_file: Path, arm: SerialArm, poses: int) -> Problem:
     """30 unknowns without any belief: 21 of links 2 to 6, tool 3, device 6; 20 um an axis."""
     session = Bench(rig_file).tracker(np.random.default_rng(1), poses)
-    chain = Chain(arm, Position(Target(TARGET_M), Device(frame(*T_BASE_DEVICE))))
+    chain = SensorChain(arm, Position(Target(TARGET_M), Device(frame(*T_BASE_DEVICE))))
     loose = tuple(replace(p, prior=np.inf, free=True) for p in chain.parameters)
     held = {p.name for p in loose if p.name.startswith(("joint1.", "link1."))}
     held |= {p.name for p in loose if p.name.endswith(".tilt") and p.name != "link2.tilt"}

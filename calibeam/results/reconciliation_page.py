@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from acquisition.recording.rig import Rig
 from calibeam.software import SOFTWARE
-from calibrate.compare.reconciled_rows import AGREES, BEYOND, ReconcileFile, RowRecord, UnseenRecord
+from calibrate.compare.reconciled_rows import AGREES, BEYOND, ReconcileFile, RowRecord, UnseenRowsRecord
 from calibrate.quantities import length, significant
 from calibrate.report.diagnosis import chain_figure, chain_of
 from calibrate.report.elements.html import (
@@ -132,7 +132,7 @@ def _pictures(file: ReconcileFile, state: str) -> Sequence[Html]:
     return out
 
 
-def _paint(figure: Figure, rows: Sequence[RowRecord], one: UnseenRecord, state: str) -> None:
+def _paint(figure: Figure, rows: Sequence[RowRecord], one: UnseenRowsRecord, state: str) -> None:
     axes = figure.add_subplot()
     values = [row.before_m if state == "before" else row.after_m for row in rows]
     every = [value for row in rows for value in (row.before_m, row.after_m)]

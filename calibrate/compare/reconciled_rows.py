@@ -19,11 +19,9 @@ from calibrate.compare.corrected import simulated_of
 from calibrate.compare.matched import (
     is_seated,
 )
+from calibrate.diagnose import limits
 from calibrate.diagnose.doubts import Verdict
 from calibrate.diagnose.record.schema import DiagnosisFile
-from calibrate.diagnose.streams.track import (
-    FEWEST,
-)
 from calibrate.errors import DataError
 from calibrate.model.sensors import (
     full_pose,
@@ -61,7 +59,7 @@ class RowRecord(msgspec.Struct, frozen=True):
     after_m: float
 
 
-class UnseenRecord(msgspec.Struct, frozen=True):
+class UnseenRowsRecord(msgspec.Struct, frozen=True):
     """Measured less simulated of one instrument on the unseen rows, rms of a coordinate."""
 
     instrument: str
@@ -110,7 +108,7 @@ class ReconcileFile(msgspec.Struct, frozen=True):
     seed: int
     seen: int
     unseen_rows: tuple[int, ...]  # from 0, in the measured samples that the simulation has, too
-    unseen: tuple[UnseenRecord, ...]
+    unseen: tuple[UnseenRowsRecord, ...]
     rows: tuple[RowRecord, ...]
     left_out: tuple[LackingRecord, ...]
     remains: tuple[str, ...]
@@ -129,7 +127,7 @@ def split(samples: Samples, seed: int) -> tuple[Ints, Ints]:
 
 
 def enough(seen: Ints, unseen: Ints) -> bool:
-    return len(seen) >= FEWEST and len(unseen) >= FEWEST_UNSEEN
+    return len(seen) >= limits.FEWEST_SAMPLES and len(unseen) >= FEWEST_UNSEEN
 
 
 def poses_of(samples: Samples) -> Ints:
@@ -198,10 +196,10 @@ def on_unseen_rows(
     unseen: Ints,
     diagnosis: DiagnosisFile,
     stated_m: Mapping[str, float | None],
-) -> tuple[tuple[UnseenRecord, ...], tuple[RowRecord, ...]]:
+) -> tuple[tuple[UnseenRowsRecord, ...], tuple[RowRecord, ...]]:
     """DataError where no instrument has a noise and unseen readings."""
     floors = {floor.instrument: floor for floor in diagnosis.floors}
-    told: list[UnseenRecord] = []
+    told: list[UnseenRowsRecord] = []
     rows: list[RowRecord] = []
     for name, columns in QUANTITIES.items():
         floor = floors.get(name)
@@ -218,7 +216,7 @@ def on_unseen_rows(
         noise_m = float(floor.rms_m)
         over = was / noise_m, plain / noise_m, now / noise_m
         told.append(
-            UnseenRecord(name, int(known.sum()), was, plain, now, noise_m, floor.source, *over, stated_m.get(name))
+            UnseenRowsRecord(name, int(known.sum()), was, plain, now, noise_m, floor.source, *over, stated_m.get(name))
         )
         each = [np.sqrt(np.mean(m[known] ** 2, axis=1)).tolist() for m in misfits]
         t_s = measured.column("t_s")[unseen][known].tolist()
@@ -233,7 +231,7 @@ def _stacked(samples: Samples, names: tuple[str, ...]) -> Floats:
 
 
 def what_remains(
-    told: tuple[UnseenRecord, ...], rows: tuple[RowRecord, ...], diagnosis: DiagnosisFile, after: ComparisonFile
+    told: tuple[UnseenRowsRecord, ...], rows: tuple[RowRecord, ...], diagnosis: DiagnosisFile, after: ComparisonFile
 ) -> Iterator[str]:
     """Why the two do not agree yet; nothing where they do."""
     for one in told:
@@ -252,7 +250,7 @@ def what_remains(
         yield from [one.says for one in after.differences if one.decides] or [after.says]
 
 
-def _few_rows(one: UnseenRecord, rows: Sequence[RowRecord]) -> str:
+def _few_rows(one: UnseenRowsRecord, rows: Sequence[RowRecord]) -> str:
     """Which rows carry it, where the others agree: most often those at the very edge of a step or of a play."""
     worst = sorted(rows, key=lambda row: row.after_m, reverse=True)
     for count in range(1, round(FEW_ROWS * len(rows)) + 1):
@@ -279,7 +277,7 @@ def what_was_left_out(before: ComparisonFile, diagnosis: DiagnosisFile, has_phys
             yield LackingRecord(one.where, one.physics, one.says, others)
 
 
-def verdict_text(told: tuple[UnseenRecord, ...], before: ComparisonFile, remains: tuple[str, ...]) -> str:
+def verdict_text(told: tuple[UnseenRowsRecord, ...], before: ComparisonFile, remains: tuple[str, ...]) -> str:
     worst = max(told, key=lambda one: one.after)
     far = f"on unseen rows {significant(worst.before)} times the noise before, {significant(worst.after)} after"
     if remains:

@@ -1,7 +1,7 @@
 """From joint readings to expected observations, with derivatives: any arm and any instrument by one chain rule.
 
 An arm (`KinematicModel`) gives flange poses; an instrument (`Sensor`) gives what it would read at them; an
-`ObservationModel` joins both, with one pose a row (`Chain`) or several.
+`ObservationModel` joins both, with one pose a row (`SensorChain`) or several.
 """
 
 from abc import ABC, abstractmethod
@@ -232,7 +232,7 @@ class ObservationModel(ABC):
 
 
 @dataclass(frozen=True)
-class Chain(ObservationModel):
+class SensorChain(ObservationModel):
     """ObservationModel of single poses."""
 
     sensor: Sensor

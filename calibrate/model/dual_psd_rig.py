@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from acquisition.recording.rig import Rig
 from calibrate.model.arms.catalogue import arm_of
-from calibrate.model.chain import Chain
+from calibrate.model.chain import SensorChain
 from calibrate.model.default_tolerance import links_of
 from calibrate.model.sensors.spots import dual_psd_of as dual_psd_of
 from calibrate.model.sensors.spots import fixture_of as fixture_of
@@ -27,12 +27,12 @@ class AssumedNoise:
     psd_m: float  # of a spot, where the samples state none
 
 
-def dual_psd_chain(rig: Rig, placement: NDArray[np.int64], first_psd: NDArray[np.int64]) -> Chain:
+def dual_psd_chain(rig: Rig, placement: NDArray[np.int64], first_psd: NDArray[np.int64]) -> SensorChain:
     """The rig's arm with its dual PSD, for poses with these placements and orders (pose,), (pose,).
 
     Links and detectors as [tolerance] states them, without one as default_tolerance.py.
     """
-    return Chain(arm_of(rig, links_of(rig)), dual_psd_of(rig, placement, first_psd))
+    return SensorChain(arm_of(rig, links_of(rig)), dual_psd_of(rig, placement, first_psd))
 
 
 def assumed_noise(rig: Rig) -> AssumedNoise:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from calibrate.model.chain import Chain
+from calibrate.model.chain import SensorChain
 from calibrate.model.placement import Device, Target
 from calibrate.model.rigid import cross, inverse
 from calibrate.model.sensors.position import Position
@@ -49,7 +49,7 @@ def flange_seen(found: WristFit, T_base_device: Floats, q_rad: Floats) -> Flange
 
 def _by(found: WristFit, T_base_device: Floats, own: Floats, point_m: Floats, q_rad: Floats) -> Floats:
     """(3, arm and device) derivative of a flange point as the device sees it."""
-    chain = Chain(found.arm, Position(Target(point_m), Device(T_base_device)))
+    chain = SensorChain(found.arm, Position(Target(point_m), Device(T_base_device)))
     J = chain.jacobian(own, q_rad[None])[0]
     n = len(found.arm.parameters)
     return np.delete(J, range(n, n + 3), axis=1)

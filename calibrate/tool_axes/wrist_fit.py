@@ -26,7 +26,7 @@ from calibrate.fit.solvers import (
     covariance_of,
     solve,
 )
-from calibrate.model.chain import Chain, KinematicModel
+from calibrate.model.chain import KinematicModel, SensorChain
 from calibrate.model.parameters import Parameter, index_of, start_values
 from calibrate.model.placement import UNKNOWN_PLAUSIBLE_M, Device, Target
 from calibrate.model.problem import Problem
@@ -175,13 +175,13 @@ class WristProblem:
 
 def chain_of(
     arm: KinematicModel, target: TargetRows, point_m: Floats, turn: Floats, T_base_device: Floats
-) -> tuple[Chain, Floats]:
+) -> tuple[SensorChain, Floats]:
     """The chain to a target's readings, and the readings (row, 3 or 6) as the sensor compares them."""
     device, about = Device(T_base_device), Target(point_m, UNKNOWN_PLAUSIBLE_M)
     if target.rotation is None:
-        return Chain(arm, Position(about, device)), target.position_m
+        return SensorChain(arm, Position(about, device)), target.position_m
     sensor = FullPose(about, device, target.rotation, turn)
-    return Chain(arm, sensor), np.concatenate([target.position_m, np.zeros_like(target.position_m)], axis=1)
+    return SensorChain(arm, sensor), np.concatenate([target.position_m, np.zeros_like(target.position_m)], axis=1)
 
 
 def _start_turn(arm: KinematicModel, mean: Floats, target: TargetRows, T_base_device: Floats) -> Floats:

@@ -19,7 +19,7 @@ from calibrate.diagnose.doubts import limits
 from calibrate.diagnose.doubts.joint_scatter import innocent
 from calibrate.diagnose.search.null import Tail
 from calibrate.diagnose.state.fitted import Fitted
-from calibrate.diagnose.state.linearised import UnseenRows, tame
+from calibrate.diagnose.state.linearised import UnseenMisfits, tame
 from calibrate.diagnose.state.noise_of_fit import freedom
 from calibrate.fit.identify.session import assumed_sigma
 from calibrate.model.checks.gross_error import postures
@@ -97,7 +97,7 @@ def hidden_of(missing: Sequence[Missing]) -> tuple[Missing, ...]:
 
 
 def _found(
-    model: Fitted, i: int, quantity: Quantity, unseen: UnseenRows, larger: float, rng: Generator, *, elsewhere: bool
+    model: Fitted, i: int, quantity: Quantity, unseen: UnseenMisfits, larger: float, rng: Generator, *, elsewhere: bool
 ) -> NoiseFound:
     name, misfit = unseen.instrument, unseen.misfit[:, quantity.part]
     stated = _stated(model, i, quantity)
@@ -154,7 +154,7 @@ def _levers(model: Fitted, i: int, quantity: Quantity) -> Floats:
 
 
 def _evidence(
-    model: Fitted, i: int, quantity: Quantity, unseen: UnseenRows, good: NDArray[np.bool_], rng: Generator
+    model: Fitted, i: int, quantity: Quantity, unseen: UnseenMisfits, good: NDArray[np.bool_], rng: Generator
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """What supports that the scatter is noise, and what opposes it; nothing of either where rows are too few."""
     misfit, sample, drivers = unseen.misfit[good][:, quantity.part], unseen.sample[good], model.drivers

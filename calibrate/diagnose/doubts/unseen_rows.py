@@ -13,7 +13,7 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 
 from calibrate.diagnose.doubts import limits
-from calibrate.diagnose.state.linearised import State, UnseenRows, tame
+from calibrate.diagnose.state.linearised import State, UnseenMisfits, tame
 from calibrate.fit.held_out import Split, by_place, last_block
 from calibrate.model.effects.drivers import Drivers
 from calibrate.model.effects.gravity import point_of
@@ -155,8 +155,8 @@ def floors(state: State, samples: Ints, parameters: int) -> tuple[Floor, ...]:
 
 
 def _proof(bare: State, full: State, samples: Ints, split: Split, rng: Generator) -> list[HeldOutProof]:
-    before: list[UnseenRows] = []
-    after: list[UnseenRows] = []
+    before: list[UnseenMisfits] = []
+    after: list[UnseenMisfits] = []
     for fold in split.unseen:
         known = np.setdiff1d(samples, fold)
         without = bare.select(known).refitted(()).held_out(fold)
@@ -166,13 +166,13 @@ def _proof(bare: State, full: State, samples: Ints, split: Split, rng: Generator
     return [_compared(split.says, name, before, after, units(bare.drivers), rng) for name in names]
 
 
-def _lengths(unseen: Sequence[UnseenRows]) -> list[UnseenRows]:
+def _lengths(unseen: Sequence[UnseenMisfits]) -> list[UnseenMisfits]:
     """Without second encoders: angles between two readings of a joint are no error of the arm."""
     return [u for u in unseen if u.instrument != ENCODER_DIFFERENCE]
 
 
 def _compared(
-    split: str, name: str, before: Sequence[UnseenRows], after: Sequence[UnseenRows], labels: Ints, rng: Generator
+    split: str, name: str, before: Sequence[UnseenMisfits], after: Sequence[UnseenMisfits], labels: Ints, rng: Generator
 ) -> HeldOutProof:
     mine = [(b, a) for b, a in zip(before, after, strict=True) if b.instrument == name]
     good = np.concatenate([tame(a.whitened, 1.0) for _, a in mine])

@@ -16,9 +16,9 @@ from calibrate.diagnose import limits
 from calibrate.diagnose.state.assumed import Assumed
 from calibrate.diagnose.state.effect_problem import EffectProblem, plain_sizes
 from calibrate.diagnose.state.in_sight import in_sight, solve_in_sight
-from calibrate.diagnose.state.linearised import UnseenRows, WhitenedRows
+from calibrate.diagnose.state.linearised import UnseenMisfits, WhitenedRows
 from calibrate.diagnose.state.noise_of_fit import (
-    Noise,
+    SessionNoise,
     covariance_at,
     noise_of,
     whiteners_of,
@@ -66,7 +66,7 @@ class Fitted:
     active: Ints  # samples that the fit sees, sorted
     problem: EffectProblem
     values: Floats  # of the problem's parameters
-    noise: Noise  # of each instrument, over its active rows
+    noise: SessionNoise  # of each instrument, over its active rows
     covariance: Floats  # (value, value) posterior; zero for held ones
     steps: int = 0  # of the solver, in all rounds of weights
     stop: Stop = Stop.ROUNDS  # the rule that ended the last round
@@ -258,21 +258,23 @@ class Fitted:
     def select(self, samples: Ints) -> "Fitted":
         return _cut(self, np.sort(samples))
 
-    def held_out(self, samples: Ints) -> tuple[UnseenRows, ...]:
+    def held_out(self, samples: Ints) -> tuple[UnseenMisfits, ...]:
         rows = _rows_of(self.session, np.sort(samples))
         moved = places_found(self.problem, self.values, self.scatters, rows, len(self._labels[0]))
         at = self.problem.around(moved)
         misfits = [m.problem.observed - e for m, e in zip(self.session.measured, at.expected, strict=True)]
         apart = misfits if self.noise.shared is None else self.noise.shared.apart(misfits)
-        out: list[UnseenRows] = []
+        out: list[UnseenMisfits] = []
         for i, (m, r) in enumerate(zip(self.session.measured, rows, strict=True)):
             if len(r) == 0 or len(self.problem.rows[i]) == 0:  # without a row in the fit its noise is unknown
                 continue
             W = whitener_of(covariance_at(self.scatters[i], self.problem.rows[i], r))
-            out.append(UnseenRows(m.name, m.sample_rows[r, -1], misfits[i][r], np.einsum("nij,nj->ni", W, apart[i][r])))
+            out.append(
+                UnseenMisfits(m.name, m.sample_rows[r, -1], misfits[i][r], np.einsum("nij,nj->ni", W, apart[i][r]))
+            )
         return tuple(out)
 
-    def _refitted(self, accepted: tuple[Accepted, ...], noise: Noise) -> "Fitted":
+    def _refitted(self, accepted: tuple[Accepted, ...], noise: SessionNoise) -> "Fitted":
         given, assumed = self.problem.given, self.problem.assumed
         terms = (*self._split[1][:given], *accepted)
         drivers, whiteners, rows = self.drivers if terms else None, whiteners_of(noise.scatters), self.problem.rows
@@ -364,7 +366,7 @@ def _settled(fitted: Fitted, renewing: bool = False) -> Fitted:
 
 
 def _turn(
-    problem: EffectProblem, active: Ints, start: Floats, noise: Noise, tolerance: float = limits.TURN_TOLERANCE
+    problem: EffectProblem, active: Ints, start: Floats, noise: SessionNoise, tolerance: float = limits.TURN_TOLERANCE
 ) -> Fitted:
     """Least squares under the noise so far, along what the data see, then the noise that is left."""
     problem = noise.under(problem)
@@ -384,7 +386,7 @@ def _cut(state: Fitted, active: Ints) -> Fitted:
         covariance = covariance_at(state.scatters[i], state.problem.rows[i], r)
         value, weights = likelihood_of(apart[i][r], covariance)
         scatters.append(Scatter(covariance, weights, value, state.scatters[i].free))
-    noise = Noise(tuple(scatters), shared)
+    noise = SessionNoise(tuple(scatters), shared)
     problem = replace(noise.under(state.problem), rows=rows, known=state.problem.known.of_other_rows())
     return replace(state, active=active, problem=problem, noise=noise)
 

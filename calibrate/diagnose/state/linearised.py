@@ -37,7 +37,7 @@ class WhitenedRows:
 
 
 @dataclass(frozen=True)
-class UnseenRows:
+class UnseenMisfits:
     """One instrument's observations that the fit has not seen."""
 
     instrument: str
@@ -110,7 +110,7 @@ class State(Protocol):
         """The same model over some of the samples, not refitted."""
         ...
 
-    def held_out(self, samples: Ints) -> tuple["UnseenRows", ...]:
+    def held_out(self, samples: Ints) -> tuple["UnseenMisfits", ...]:
         """What this state, fitted on other samples, predicts of these. Where a place or seat occurs in these samples
         only, its own frame or point is found from them first, everything else being held.
         """

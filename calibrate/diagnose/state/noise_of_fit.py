@@ -1,4 +1,4 @@
-"""Noise of every instrument at a fit: how large, how far each observation is trusted, and what whitens it."""
+"""SessionNoise of every instrument at a fit: how large, how far each observation is trusted, and what whitens it."""
 
 from dataclasses import dataclass, replace
 
@@ -18,7 +18,7 @@ Ints = NDArray[np.intp]
 
 
 @dataclass(frozen=True, eq=False)
-class Noise:
+class SessionNoise:
     """Of all instruments, over the active rows."""
 
     scatters: tuple[Scatter, ...]  # of each instrument, without what it shares
@@ -29,7 +29,7 @@ class Noise:
         return problem.under(whiteners_of(self.scatters), self.shared)
 
     @property
-    def trusted(self) -> "Noise":
+    def trusted(self) -> "SessionNoise":
         """The same, every observation with its full weight."""
         return replace(self, scatters=tuple(replace(s, weights=np.ones(len(s.weights))) for s in self.scatters))
 
@@ -43,8 +43,8 @@ class Noise:
         return tuple(s if more is None else replace(s, covariance=s.covariance + more[r]) for s, more, r in each)
 
 
-def noise_of(problem: EffectProblem, fit: Fit) -> Noise:
-    """Noise of every instrument at the values of a fit; what they share with second encoders is found first."""
+def noise_of(problem: EffectProblem, fit: Fit) -> SessionNoise:
+    """SessionNoise of every instrument at the values of a fit; what they share with second encoders is found first."""
     at, larger = problem.around(fit.theta), freedom(problem, fit.theta, fit.covariance)
     measured = problem.session.measured
     residuals = [m.problem.observed - expected for m, expected in zip(measured, at.expected, strict=True)]
@@ -57,7 +57,7 @@ def noise_of(problem: EffectProblem, fit: Fit) -> Noise:
 
     witness = witness_of([m.problem.chain for m in measured])
     if witness is None or len(measured) == 1 or len(problem.rows[witness]) == 0:
-        return Noise(tuple(found(i, residual) for i, residual in enumerate(residuals)))
+        return SessionNoise(tuple(found(i, residual) for i, residual in enumerate(residuals)))
     seen = found(witness, residuals[witness])
     trust = _trust(seen, residuals[witness], problem.rows[witness])
     chains, samples = [m.problem.chain for m in measured], [m.sample_rows for m in measured]
@@ -67,7 +67,9 @@ def noise_of(problem: EffectProblem, fit: Fit) -> Noise:
     out = [seen if i == witness else found(i, alone) for i, alone in enumerate(shared.apart(residuals))]
     more = [shared.unseen(i, middle_of(seen)) for i in range(len(out))]
     each = zip(out, more, problem.rows, strict=True)
-    return Noise(tuple(s if m is None else replace(s, covariance=s.covariance + m[r]) for s, m, r in each), shared)
+    return SessionNoise(
+        tuple(s if m is None else replace(s, covariance=s.covariance + m[r]) for s, m, r in each), shared
+    )
 
 
 def _trust(seen: Scatter, residual: Floats, known: Ints) -> Floats:

@@ -18,7 +18,7 @@ from acquisition.recording import Samples
 from acquisition.recording.rig import Rig
 from calibrate.errors import DataError
 from calibrate.model.alignment import align_with_tool
-from calibrate.model.chain import Chain
+from calibrate.model.chain import SensorChain
 from calibrate.model.checks.witness import (
     Otherwise,
     Strain,
@@ -110,7 +110,7 @@ def _build(table: SampleTable) -> Measured | None:
     observed = np.concatenate([place_m, np.zeros((len(rows), 3))], axis=1)
     sigmas = np.diag(camera_sigmas(table.rig))
     own = {source.name: np.tile(one, (len(rows), 1)) for source, one in zip(SOURCES, sigmas, strict=True)}
-    return table.measured(KIND.name, Chain(table.arm, sensor), rows, observed, own)
+    return table.measured(KIND.name, SensorChain(table.arm, sensor), rows, observed, own)
 
 
 def _witness(rig: Rig, samples: Samples, q_rad: Floats) -> Witness | None:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from acquisition.recording import Samples
 from acquisition.recording.samples import per_joint
 from calibrate.errors import DataError
-from calibrate.model.chain import Chain, Usage
+from calibrate.model.chain import SensorChain, Usage
 from calibrate.model.parameters import Parameter
 from calibrate.model.problem import Measured
 from calibrate.model.sample_table import SampleTable
@@ -186,7 +186,7 @@ def _build(table: SampleTable) -> Measured | None:
     if len(rows) < FEWEST:
         return None
     sigma = np.full((len(rows), len(sensor.joints)), BELIEVED_RAD)
-    return table.measured(NAME, Chain(table.arm, sensor), rows, observed[rows], {SOURCE: sigma})
+    return table.measured(NAME, SensorChain(table.arm, sensor), rows, observed[rows], {SOURCE: sigma})
 
 
 def _about_middle(difference_rad: Floats) -> tuple[float, Floats]:

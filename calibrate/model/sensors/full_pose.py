@@ -17,7 +17,7 @@ from acquisition.recording import Samples
 from acquisition.recording.rig import Rig
 from acquisition.recording.samples import ORIENTATION, POSITION
 from calibrate.model.alignment import best_rotation, nearest_rotation
-from calibrate.model.chain import About, Chain, Usage
+from calibrate.model.chain import About, SensorChain, Usage
 from calibrate.model.checks.gross_error import GrossErrorKind
 from calibrate.model.checks.rough_fit import median, weights
 from calibrate.model.checks.witness import (
@@ -237,7 +237,7 @@ def _build(table: SampleTable) -> Measured | None:
     observed[:, :3], sigma[:, :3] = table.position_m[rows], position_sigma_m(table.rig)
     turn[:, 3:] = ORIENTATION_BELIEVED_RAD
     own = dict(zip((source.name for source in KIND.noise), (sigma, turn), strict=True))
-    return table.measured(KIND.name, Chain(table.arm, sensor), rows, observed, own)
+    return table.measured(KIND.name, SensorChain(table.arm, sensor), rows, observed, own)
 
 
 def _witness(rig: Rig, samples: Samples, q_rad: Floats) -> Witness | None:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from acquisition.recording.samples import SPOTS
 from calibrate.errors import DataError
-from calibrate.model.chain import Chain, Usage
+from calibrate.model.chain import SensorChain, Usage
 from calibrate.model.observations import observations
 from calibrate.model.optics.laser import CENTRED_M, LaserMount, Lines, nearest_point
 from calibrate.model.parameters import Parameter
@@ -111,7 +111,9 @@ def _build(table: SampleTable) -> Measured | None:
     mount = laser_of(table.rig)
     sensor = PointLine(mount, meeting_points(mount, table.T_base_flange[rows], place))
     own = {KIND.noise[0].name: np.full((len(rows), 2), LINE_BELIEVED_M)}
-    return table.measured(KIND.name, Chain(table.arm, sensor), rows, np.zeros((len(rows), 2)), own, condition=True)
+    return table.measured(
+        KIND.name, SensorChain(table.arm, sensor), rows, np.zeros((len(rows), 2)), own, condition=True
+    )
 
 
 KIND = SensorKind(

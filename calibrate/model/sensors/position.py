@@ -11,7 +11,7 @@ from acquisition.recording import Samples
 from acquisition.recording.rig import Rig
 from acquisition.recording.samples import ORIENTATION, POSITION, TARGET
 from calibrate.errors import DataError
-from calibrate.model.chain import About, Chain, Usage
+from calibrate.model.chain import About, SensorChain, Usage
 from calibrate.model.checks.gross_error import GrossErrorKind
 from calibrate.model.checks.rough_fit import rough_fit_of_targets, rows_of_another_session
 from calibrate.model.checks.witness import (
@@ -194,7 +194,7 @@ def _build(table: SampleTable) -> Measured | None:
     if len(rows) == 0:
         return None
     own = {NOISE.name: np.full((len(rows), 3), position_sigma_m(table.rig))}
-    chain = Chain(table.arm, Position(table.targets(rows) or table.target, table.device()))
+    chain = SensorChain(table.arm, Position(table.targets(rows) or table.target, table.device()))
     return table.measured(KIND.name, chain, rows, table.position_m[rows], own)
 
 

@@ -16,7 +16,7 @@ from acquisition.recording.rig import Rig
 from acquisition.recording.samples import BAR, SEAT
 from calibrate.errors import DataError
 from calibrate.model.alignment import pivot
-from calibrate.model.chain import About, Chain, Standing, Usage
+from calibrate.model.chain import About, SensorChain, Standing, Usage
 from calibrate.model.checks.rough_fit import damped, median, weights
 from calibrate.model.checks.witness import (
     Otherwise,
@@ -163,7 +163,7 @@ def _build(table: SampleTable) -> Measured | None:
     if len(rows) == 0:
         return None
     seat = table.samples.integers(SEAT, 0)[rows]
-    chain = Chain(table.arm, Seat(table.target, mean_tips(table.tips_m[rows], seat)))
+    chain = SensorChain(table.arm, Seat(table.target, mean_tips(table.tips_m[rows], seat)))
     own = {NOISE.name: np.full((len(rows), 3), seat_sigma_m(table.rig))}
     return table.measured(KIND.name, chain, rows, np.zeros((len(rows), 3)), own, condition=True)
 

@@ -18,7 +18,7 @@ from acquisition.recording.rig import Rig
 from acquisition.recording.samples import SPOTS
 from calibrate.errors import DataError
 from calibrate.model.alignment import best_rotation
-from calibrate.model.chain import Chain
+from calibrate.model.chain import SensorChain
 from calibrate.model.checks.gross_error import GrossErrorKind
 from calibrate.model.checks.rough_fit import median, weights
 from calibrate.model.checks.witness import (
@@ -178,7 +178,7 @@ def _build(table: SampleTable) -> Measured | None:
     seen = observations(table.samples, table.angles)
     sensor = dual_psd_of(table.rig, seen.placement, seen.first_psd)
     sigma = np.full((len(rows), 4), psd_sigma_m(table.rig)) if seen.sigma_m is None else seen.sigma_m
-    return table.measured(KIND.name, Chain(table.arm, sensor), rows, seen.spots_m, {KIND.noise[0].name: sigma})
+    return table.measured(KIND.name, SensorChain(table.arm, sensor), rows, seen.spots_m, {KIND.noise[0].name: sigma})
 
 
 def _known_distances(table: SampleTable) -> tuple[Block, ...]:

@@ -12,7 +12,7 @@ from acquisition.recording.rig import Rig
 from acquisition.recording.samples import WIRE as COLUMN
 from calibrate.errors import DataError
 from calibrate.model.alignment import trilaterate
-from calibrate.model.chain import About, Chain, Usage
+from calibrate.model.chain import About, SensorChain, Usage
 from calibrate.model.checks.gross_error import GrossErrorKind
 from calibrate.model.checks.rough_fit import least_distance, median
 from calibrate.model.checks.witness import (
@@ -147,7 +147,7 @@ def _build(table: SampleTable) -> Measured | None:
         )
     sensor = Wire(table.target, table.device(lambda: trilaterate(table.tips_m[rows], length_m)))
     own = {KIND.noise[0].name: np.full((len(rows), 1), table.rig.noise.wire_m or WIRE_BELIEVED_M)}
-    return table.measured(KIND.name, Chain(table.arm, sensor), rows, length_m[:, None], own)
+    return table.measured(KIND.name, SensorChain(table.arm, sensor), rows, length_m[:, None], own)
 
 
 def _witness(rig: Rig, samples: Samples, q_rad: Floats) -> Witness | None:

@@ -6,7 +6,7 @@ from typing import Self
 import numpy as np
 
 from acquisition.recording import Samples
-from calibrate.model.chain import About, Chain, Usage
+from calibrate.model.chain import About, SensorChain, Usage
 from calibrate.model.parameters import Parameter
 from calibrate.model.placement import Device, Target, point_by_twist
 from calibrate.model.problem import Measured
@@ -78,7 +78,7 @@ def _build(table: SampleTable) -> Measured | None:
     height_m = table.samples.column(COLUMN)[rows]
     T_base_plate = np.eye(4)
     T_base_plate[2, 3] = np.mean(table.tips_m[rows, 2] - height_m)
-    chain = Chain(table.arm, Height(table.target, Device(T_base_plate, name="plate")))
+    chain = SensorChain(table.arm, Height(table.target, Device(T_base_plate, name="plate")))
     own = {"height": np.full((len(rows), 1), SIGMA_M)}
     return table.measured(KIND.name, chain, rows, height_m[:, None], own)
 

@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from acquisition.recording.rig import Rig
-from calibrate.diagnose.state.linearised import UnseenRows, WhitenedRows
+from calibrate.diagnose.state.linearised import UnseenMisfits, WhitenedRows
 from calibrate.model.effects.drivers import Drivers
 from calibrate.model.effects.ports import Place, Port
 from calibrate.model.effects.term import (
@@ -217,9 +217,9 @@ class LinearSession:
         chosen = np.sort(samples)
         return replace(self, active=chosen, weights=self.weights[np.searchsorted(self.active, chosen)])
 
-    def held_out(self, samples) -> tuple[UnseenRows, ...]:
+    def held_out(self, samples) -> tuple[UnseenMisfits, ...]:
         misfit = self._misfit[np.sort(samples)]
-        return (UnseenRows("linear", np.sort(samples), misfit, misfit / self.sigma),)
+        return (UnseenMisfits("linear", np.sort(samples), misfit, misfit / self.sigma),)
 
 
 @dataclass(frozen=True)

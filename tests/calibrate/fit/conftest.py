@@ -11,7 +11,7 @@ from calibrate.fit.rank.identifiability import Identifiability, analyse
 from calibrate.fit.rank.observability import reduced
 from calibrate.fit.solvers import Fit, solve
 from calibrate.model.arms.catalogue import arm_of
-from calibrate.model.chain import Chain
+from calibrate.model.chain import SensorChain
 from calibrate.model.placement import Device, Target
 from calibrate.model.problem import Problem
 from calibrate.model.rigid import transform
@@ -40,7 +40,7 @@ def fitted(request, bench):
 
     def get(seed, poses=40, noise=1.0):
         session = bench.tracker(np.random.default_rng(seed), poses)
-        chain = Chain(arm_of(rig), Position(Target(TARGET_M), Device(transform(*T_BASE_DEVICE))))
+        chain = SensorChain(arm_of(rig), Position(Target(TARGET_M), Device(transform(*T_BASE_DEVICE))))
         extra = np.random.default_rng(seed + 1).normal(size=session.observed.shape)
         observed = session.observed + np.sqrt(max(noise**2 - 1.0, 0.0)) * POSITION_SIGMA_M * extra
         weights = np.tile(np.eye(3) / POSITION_SIGMA_M, (poses, 1, 1))

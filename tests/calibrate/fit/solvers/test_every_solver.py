@@ -17,7 +17,7 @@ from calibrate.fit.solvers import (
     Stop,
     solve,
 )
-from calibrate.model.chain import Chain
+from calibrate.model.chain import SensorChain
 from calibrate.model.dual_psd_rig import dual_psd_chain
 from calibrate.model.parameters import plausible_sizes, start_values
 from calibrate.model.placement import Device, Target
@@ -94,7 +94,7 @@ def tracker(request, ur5e_truth):
     base = np.array([(truth.flange(q) @ [*point_m, 1.0])[:3] for q in q_rad + truth.zeros])
     seen = R.inv().apply(base - origin_m) + rng.normal(0, POSITION_SIGMA_M, base.shape)
     arm = dual_psd_chain(rig, np.ones(1, dtype=int), np.ones(1, dtype=int)).model
-    chain = Chain(arm, Position(Target(point_m + 1e-3), Device(believed)))
+    chain = SensorChain(arm, Position(Target(point_m + 1e-3), Device(believed)))
     return determined(Problem(chain, chain.parameters, q_rad, seen, np.tile(np.eye(3) / POSITION_SIGMA_M, (60, 1, 1))))
 
 
