@@ -6,6 +6,7 @@ import json
 import shutil
 from contextlib import redirect_stdout
 from functools import partial
+from importlib import import_module
 
 import numpy as np
 import pytest
@@ -257,7 +258,7 @@ def test_every_way_to_read_positions_ends_with_a_verdict(folder, tmp_path, capsy
 
 def test_a_fit_that_came_to_no_end_is_partial_and_its_model_is_kept(folder, tmp_path, capsys, monkeypatch):
     model = tmp_path / "model.json"
-    monkeypatch.setattr("calibrate.fit.solvers.solve.solve", partial(solve, max_steps=0))
+    monkeypatch.setattr(import_module("calibrate.fit.solvers.solve"), "solve", partial(solve, max_steps=0))
     assert run(["identify", str(folder), "--out", str(model)]) == 3
     told = capsys.readouterr()
     assert "No usable model: step limit reached" in " ".join(told.out.split())
