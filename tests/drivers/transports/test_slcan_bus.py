@@ -44,8 +44,12 @@ class Adapter:
     def says(self, data: bytes) -> None:
         os.write(self._far, data)
 
-    def hears(self) -> bytes:
-        return os.read(self._far, 4096)
+    def hears(self, end: bytes) -> bytes:
+        """All up to what ends so: a pseudo-terminal hands on what was written in any pieces."""
+        said = b""
+        while not said.endswith(end):
+            said += os.read(self._far, 4096)
+        return said
 
     def is_unplugged(self) -> None:
         os.close(self._far)
@@ -122,9 +126,9 @@ def test_an_unplugged_adapter_raises_what_python_can_raises(adapter: Adapter) ->
 
 
 def test_frames_are_sent_as_lines(adapter: Adapter) -> None:
-    adapter.hears()  # how the adapter was opened
+    adapter.hears(b"O\rO\r")  # how the adapter was opened
     adapter.bus.send(can.Message(arbitration_id=0x601, data=b"\x40\x00", is_extended_id=False))
-    assert adapter.hears() == b"t60124000\r"
+    assert adapter.hears(b"\r") == b"t60124000\r"
 
 
 def send_while_it_takes(bus: can.BusABC, message: can.Message, sent: Iterator[int]) -> None:
@@ -135,7 +139,7 @@ def send_while_it_takes(bus: can.BusABC, message: can.Message, sent: Iterator[in
 
 
 def test_an_adapter_that_takes_nothing_more_is_told_in_time_and_no_frame_is_torn(adapter: Adapter) -> None:
-    adapter.hears()  # how the adapter was opened
+    adapter.hears(b"O\rO\r")  # how the adapter was opened
     message, sent = can.Message(arbitration_id=0x281, data=bytes(8), is_extended_id=False), itertools.count()
     with pytest.raises(can.CanOperationError, match="Could not write"):
         send_while_it_takes(adapter.bus, message, sent)
