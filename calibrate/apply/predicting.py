@@ -5,7 +5,7 @@ readings, and of the conditions that a row lacks; the instrument's own noise is 
 
 The robot's own base frame is the one that lies best on the arm itself, wherever in the world the arm stands. A device
 of unknown place does not show where the base is, nor a first joint how the base is turned beside its zero. As in the
-predicted error over the workspace (uncertainty/free_space.py) such a motion of everything is no error of the arm.
+predicted error over the workspace (fit/accuracy.py) such a motion of everything is no error of the arm.
 
 Readings of a model's own recording less what its effects add are what a fit of geometry alone needs.
 """
@@ -275,7 +275,7 @@ def _felt(at: At, predictor: Predictor, by: Perturbation, port: Port, amount: Fl
 class Placed:
     """Where the arm holds flange and tip in its base, each row with one sigma; `outside`, `notes` as in `Predicted`.
 
-    Sigmas are of the robot's own frame (own_frame.py) or of the world, as asked.
+    Sigmas are of the robot's own frame (`OwnFrame`) or of the world, as asked.
     """
 
     T_base_flange: Floats  # (row, 4, 4)

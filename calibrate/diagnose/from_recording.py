@@ -199,7 +199,7 @@ def runs_of(far: Ints, samples: int) -> list[tuple[Ints, float]]:
     """Of samples that err (far,) those that follow each other without one between, and how likely chance has such runs.
 
     As many errors that hit samples independently have no more than n (k/n)^r runs of r on average, k errors among n
-    (Feller, An introduction to probability theory, vol. 1, 3rd ed. 1968, XIII.7, first term); kept below RUN_P.
+    (Feller, An introduction to probability theory, vol. 1, 3rd ed. 1968, XIII.7, first term); kept below RUN_ALPHA.
     """
     runs = np.split(np.unique(far), np.flatnonzero(np.diff(np.unique(far)) > 1) + 1)
     each = [(run, samples * (len(far) / samples) ** len(run)) for run in runs if len(run) >= limits.FEWEST_IN_A_RUN]

@@ -1,4 +1,8 @@
-"""Robot programs with their targets corrected: KRL, RAPID, URScript, FANUC LS. Nothing but the targets changes."""
+"""Programs of robot controllers whose targets are corrected: only literals change, everything else is kept.
+
+A dialect is one file beside this one and one line in `DIALECTS` (rewriting.py): where a program's targets stand in its
+text, in which units and rotations, and how a point-to-point move to joint angles is written.
+"""
 
 from calibrate.apply.programs.rewriting import correct_program, dialect_of
 

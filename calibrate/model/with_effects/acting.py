@@ -37,7 +37,7 @@ TURNS = 3  # drivers follow the frames that the effects have moved; each turn le
 STEP = 1e-3  # of an inner value, for its difference quotient
 SAME = 1e-6  # of a basis: then the exact formula has the same meaning as in the session
 UNIFORM = np.sqrt(3.0)  # half the width of a uniform law over its standard deviation
-CARRIED = 0.05  # of an effect's size: more may not be lost where its columns are chosen again (diagnose/extended.py)
+CARRIED = 0.05  # of an effect's size: more may not be lost where its columns are chosen again (new_poses.py)
 
 
 @dataclass(frozen=True, eq=False)

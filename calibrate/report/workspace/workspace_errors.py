@@ -43,7 +43,7 @@ JOINT = "joint"
 
 @dataclass(frozen=True)
 class KnownArm:
-    """A `Valued` (uncertainty/free_space.py) whose values are those that were found."""
+    """A `Valued` (fit/accuracy.py) whose values are those that were found."""
 
     arm: KinematicModel
     parameters: tuple[Parameter, ...]  # of the whole fit; those of the arm are among them by name

@@ -44,11 +44,14 @@ class Adapter:
     def says(self, data: bytes) -> None:
         os.write(self._far, data)
 
-    def hears(self, end: bytes) -> bytes:
-        """All up to what ends so: a pseudo-terminal hands on what was written in any pieces."""
+    def hears(self) -> bytes:
+        """A piece: a pseudo-terminal hands on what was written in any pieces."""
+        return os.read(self._far, 4096)
+
+    def hears_until(self, end: bytes) -> bytes:
         said = b""
         while not said.endswith(end):
-            said += os.read(self._far, 4096)
+            said += self.hears()
         return said
 
     def is_unplugged(self) -> None:
@@ -126,9 +129,9 @@ def test_an_unplugged_adapter_raises_what_python_can_raises(adapter: Adapter) ->
 
 
 def test_frames_are_sent_as_lines(adapter: Adapter) -> None:
-    adapter.hears(b"O\rO\r")  # how the adapter was opened
+    adapter.hears_until(b"O\rO\r")  # how the adapter was opened
     adapter.bus.send(can.Message(arbitration_id=0x601, data=b"\x40\x00", is_extended_id=False))
-    assert adapter.hears(b"\r") == b"t60124000\r"
+    assert adapter.hears_until(b"\r") == b"t60124000\r"
 
 
 def send_while_it_takes(bus: can.BusABC, message: can.Message, sent: Iterator[int]) -> None:
@@ -139,12 +142,11 @@ def send_while_it_takes(bus: can.BusABC, message: can.Message, sent: Iterator[in
 
 
 def test_an_adapter_that_takes_nothing_more_is_told_in_time_and_no_frame_is_torn(adapter: Adapter) -> None:
-    adapter.hears(b"O\rO\r")  # how the adapter was opened
+    adapter.hears_until(b"O\rO\r")  # how the adapter was opened
     message, sent = can.Message(arbitration_id=0x281, data=bytes(8), is_extended_id=False), itertools.count()
     with pytest.raises(can.CanOperationError, match="Could not write"):
         send_while_it_takes(adapter.bus, message, sent)
-    taken = b""
-    whole = next(sent)
+    taken, whole = b"", next(sent)
     while taken.count(b"\r") < whole:
         taken += adapter.hears()
     assert taken.startswith(whole * b"t28180000000000000000\r")
