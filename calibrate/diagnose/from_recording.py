@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
-from scipy.stats import norm
+from scipy.special import ndtr
 
 from acquisition.recording import Samples
 from acquisition.recording.rig import Rig
@@ -226,7 +226,7 @@ def beyond_noise(found: NoiseFound, missing: Sequence[Missing]) -> Unexplained:
     """What is left beyond a stated noise, as structure without a name."""
     times, sigma = found.times or 1.0, found.times_sigma or 0.0
     lacking = hidden_of(missing)
-    p = float(norm.sf((times**2 - 1.0) / max(2.0 * times * sigma, 1e-300)))
+    p = float(ndtr((1.0 - times**2) / max(2.0 * times * sigma, 1e-300)))
     drivers = tuple(dict.fromkeys(m.driver for m in lacking))
     return Unexplained(
         "", drivers, 1.0 - 1.0 / times**2, max(p, search_limits.LEAST_P), found.says + missing_words(missing)

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import norm
+from scipy.special import ndtri
 
 from calibrate.diagnose import limits as shared_limits
 from calibrate.diagnose.doubts import limits
@@ -79,7 +79,7 @@ class Smallest:
 def smallest_visible(bench: Bench) -> tuple[Smallest, ...]:
     """Of every place and physics that the poses show, by its best-seen form; inner values at the middle of the grid."""
     menu, best = bench.menu, dict[tuple[str, str], Smallest]()
-    needed = (norm.isf(LEVEL / (2.0 * max(len(menu.entries), 1))) + norm.ppf(POWER)) ** 2
+    needed = (ndtri(POWER) - ndtri(LEVEL / (2.0 * max(len(menu.entries), 1)))) ** 2
     middle = {entry.term: i for i, entry in enumerate(menu.entries) if _is_middle(bench, i)}
     for block in menu.blocks:
         for at, i in enumerate(block.entries):

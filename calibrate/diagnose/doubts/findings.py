@@ -16,7 +16,7 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import poisson
+from scipy.special import pdtrc
 
 from calibrate.diagnose.doubts import limits
 from calibrate.diagnose.doubts.diagnosis import (
@@ -232,7 +232,7 @@ def pieces(accepted: Sequence[Accepted], places: int) -> list[tuple[int, ...]]:
 def _meet_too_often(here: int, elsewhere: int, places: int) -> bool:
     """Whether so many names at one of the places are no chance, at the rate of all others."""
     rate = (elsewhere + limits.UNSEEN_FAULTS) / max(places - 1, 1)
-    return here >= limits.FAULTS_AT_ONE_PLACE and float(poisson.sf(here - 1, rate)) * places < limits.FAULTS_BY_CHANCE
+    return here >= limits.FAULTS_AT_ONE_PLACE and float(pdtrc(here - 1, rate)) * places < limits.FAULTS_BY_CHANCE
 
 
 def _of_pose(driver: str) -> bool:

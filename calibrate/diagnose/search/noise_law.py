@@ -10,12 +10,12 @@ Source: Brockwell, Davis, Time Series: Theory and Methods, 1991, sections 3.1 an
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 from scipy.fft import dct
-from scipy.signal import lfilter
 
 from calibrate.diagnose.search import limits
 from calibrate.diagnose.state.linearised import WhitenedRows
@@ -45,9 +45,10 @@ class Wander:
         white: Floats = rng.standard_normal(shape)
         if self.share == 0.0:
             return white
-        shocks: Floats = rng.standard_normal(shape)
-        shocks[1:] *= np.sqrt(1.0 - self.rho**2)
-        slow = np.asarray(lfilter([1.0], [1.0, -self.rho], shocks, axis=0))
+        slow: Floats = rng.standard_normal(shape)
+        slow[1:] *= np.sqrt(1.0 - self.rho**2)
+        for before, now in pairwise(slow):
+            now += self.rho * before
         white *= np.sqrt(1.0 - self.share)  # in place: draws are large
         slow *= np.sqrt(self.share)
         white += slow

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
-from scipy.stats import genpareto
+from scipy.special import inv_boxcox
 
 from calibrate.diagnose.search import limits
 from calibrate.diagnose.search.noise_law import NoiseLaw
@@ -50,7 +50,7 @@ class Tail:
         # Bounded tails would claim p = 0 just beyond the largest draw: an exponential one is the shortest allowed.
         shape = max(0.0, 0.5 * (1.0 - mean**2 / variance))
         scale = mean * (1.0 - shape)
-        beyond = float(genpareto.sf(value - threshold, shape, scale=scale))
+        beyond = float(inv_boxcox((threshold - value) / scale, -shape))  # generalised Pareto
         return max(limits.LEAST_P, len(excess) / count * beyond)
 
 

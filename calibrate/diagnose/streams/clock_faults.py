@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import norm
+from scipy.special import ndtr
 
 from calibrate.diagnose.streams import limits
 from calibrate.diagnose.streams.clock import ClockFit
@@ -105,7 +105,7 @@ def lateness(joints: StreamDevice, other: StreamDevice, fit: ClockFit) -> Late |
     by_stamps_s = start.offset_s + start.rate_error * (fit.middle_s - start.at_s)
     sigma_s = float(np.hypot(fit.offset_sigma_s, np.hypot(stamps_scatter_s(joints), stamps_scatter_s(other))))
     late_s = by_stamps_s - fit.offset_s
-    p = float(2.0 * norm.sf(abs(late_s) / max(sigma_s, 1e-12)))
+    p = float(2.0 * ndtr(-abs(late_s) / max(sigma_s, 1e-12)))
     if fit.drift is not None and fit.drift_sigma is not None:
-        p = min(p, float(2.0 * norm.sf(abs(fit.drift) / max(fit.drift_sigma, 1e-15))))
+        p = min(p, float(2.0 * ndtr(-abs(fit.drift) / max(fit.drift_sigma, 1e-15))))
     return Late(late_s, sigma_s, fit.drift, fit.drift_sigma, p)

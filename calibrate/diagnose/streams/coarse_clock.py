@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import correlate, correlation_lags
+from scipy.fft import irfft, next_fast_len, rfft
 
 from calibrate.diagnose.streams import limits
 from calibrate.diagnose.streams.track import Track
@@ -88,12 +88,15 @@ def _best(ref_s: Floats, ref: Floats, own_s: Floats, own: Floats) -> tuple[float
     floor = 1e-9 * float(np.max(spread, initial=0.0))
     score = np.where(enough & (spread > floor), both / np.sqrt(np.maximum(spread, max(floor, 1e-300))), -1.0)
     at = int(np.argmax(score))
-    lags = correlation_lags(len(ref), len(own))
-    return float(ref_s[0] - own_s[0] + lags[at] * limits.GRID_S), float(score[at])
+    lag = at + 1 - len(own)
+    return float(ref_s[0] - own_s[0] + lag * limits.GRID_S), float(score[at])
 
 
 def _slid(one: Floats, two: Floats) -> Floats:
-    return np.asarray(correlate(one, two, mode="full", method="fft"), dtype=np.float64)
+    """Products at every lag, the last of `two` on the first of `one` first."""
+    count = len(one) + len(two) - 1
+    size = next_fast_len(count, real=True)
+    return np.asarray(irfft(rfft(one, size) * rfft(two[::-1], size), size), dtype=np.float64)[:count]
 
 
 def _range(values: Floats) -> float:

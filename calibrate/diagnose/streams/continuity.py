@@ -5,7 +5,6 @@ from enum import Enum
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import binom
 
 from calibrate.diagnose.streams import limits
 from calibrate.diagnose.streams.track import Track, white_noise
@@ -133,4 +132,4 @@ def _too_long(equal: Bools, first: int, last: int) -> bool:
     run = last - first
     outside = len(equal) - run
     repeats = (int(equal.sum()) - run + 1) / max(outside + 1, 1)
-    return bool(len(equal) * binom.pmf(run, run, repeats) < limits.FROZEN_CHANCE)
+    return bool(len(equal) * repeats**run < limits.FROZEN_CHANCE)

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import hankel
 from scipy.optimize import least_squares
-from scipy.stats import f
+from scipy.special import fdtrc
 
 from calibrate.diagnose.streams import limits
 
@@ -59,7 +59,7 @@ def chance(before: float, after: float, numbers: int, size: int) -> float:
     """Of white noise giving such a swing anywhere in the band: F test, times the frequencies that were open."""
     left = after / max(size - numbers, 1)
     gain = max(before - after, 0.0) / numbers
-    return float(size * f.sf(gain / max(left, 1e-300), numbers, max(size - numbers, 1)))
+    return float(size * fdtrc(numbers, max(size - numbers, 1), gain / max(left, 1e-300)))
 
 
 def _numbers(y: Floats) -> int:

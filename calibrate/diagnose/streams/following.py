@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import norm
+from scipy.special import ndtr
 
 from calibrate.diagnose.streams import limits
 from calibrate.diagnose.streams.clock import RobustLine, fit
@@ -64,7 +64,7 @@ def _joint(joint: int, error: Floats, v: Floats, a: Floats, block: NDArray[np.in
     if line is None:
         return Following(joint, Outcome.NOT_DETERMINABLE)
     behind_s, sigma_s = float(line.values[0]), float(line.sigma[0])
-    p = float(2.0 * norm.sf(abs(behind_s) / max(sigma_s, 1e-300)))
+    p = float(2.0 * ndtr(-abs(behind_s) / max(sigma_s, 1e-300)))
     found = p < limits.FOLLOWING_ALPHA and abs(behind_s) > limits.BEHIND_S
     return Following(
         joint,

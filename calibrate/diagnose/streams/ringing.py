@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
+from scipy.special import chdtrc
 
 from calibrate.diagnose.streams import limits
 from calibrate.diagnose.streams.damped import Swing, chance, swing
@@ -87,7 +87,7 @@ def _joined(sure: list[tuple[Stand, float, Swing, float]], levers: Levers | None
     frequency = _mean([s.frequency_hz for s in swings], [s.frequency_sigma_hz for s in swings])
     damping = _mean([s.damping for s in swings], [s.damping_sigma for s in swings])
     joint, rivals = _joint(sure, levers)
-    p = float(chi2.sf(-2.0 * sum(np.log(max(one[3], 1e-300)) for one in sure), 2 * len(sure)))  # Fisher 1925
+    p = float(chdtrc(2 * len(sure), -2.0 * sum(np.log(max(one[3], 1e-300)) for one in sure)))  # Fisher 1925
     return Ringing(
         Outcome.FOUND,
         *frequency,

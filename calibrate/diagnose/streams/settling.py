@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import norm
+from scipy.special import ndtr
 
 from calibrate.diagnose.streams import limits
 from calibrate.diagnose.streams.track import Outcome, Track, white_noise
@@ -105,7 +105,7 @@ def _of_window(track: Track, window: Window, stand: Stand | None, tests: int) ->
     white = np.maximum(white_noise(late), _slow(late))
     white = np.where(np.isfinite(white) & (white > 0.0), white, np.finfo(float).tiny)
     sigma = white * np.sqrt(1.0 / len(own) + 1.0 / len(late))
-    p = min(1.0, tests * len(missing) * float(2.0 * norm.sf(np.max(np.abs(missing) / sigma))))
+    p = min(1.0, tests * len(missing) * float(2.0 * ndtr(-np.max(np.abs(missing) / sigma))))
     if p >= limits.SETTLING_ALPHA or np.all(np.abs(missing) < limits.MISSED_SIGMAS * white):
         return Unsettled(Outcome.ABSENT, missing, sigma, p=p)
     settling = _cut(track, stand.from_s, stand.to_s)

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import orth
-from scipy.stats import t as student
+from scipy.special import stdtr
 
 from calibrate.diagnose.search.null import is_slow
 from calibrate.diagnose.state.fitted import Fitted
@@ -167,7 +167,7 @@ def _best(base: Floats, d: Floats, tests: int) -> tuple[int, float] | None:
             continue
         value = float(step @ residual) / size
         left = float(np.sum((residual - value * step) ** 2)) / (n - k)
-        p = tests * 2.0 * float(student.sf(abs(value) / np.sqrt(max(left, 1e-300) / size), n - k))
+        p = tests * 2.0 * float(stdtr(n - k, -abs(value) / np.sqrt(max(left, 1e-300) / size)))
         if p < limits.SLIP_ALPHA and (best is None or p < best[1]):
             best = place, p
     return best
@@ -187,7 +187,7 @@ def _sized(
     for i, place in enumerate(places):
         at = len(level) + i
         sigma = float(np.sqrt(variance * inverse[at, at]))
-        p = min(1.0, tests * 2.0 * float(student.sf(abs(values[at]) / max(sigma, 1e-300), left)))
+        p = min(1.0, tests * 2.0 * float(stdtr(left, -abs(values[at]) / max(sigma, 1e-300))))
         out[place] = Slip(joint, float(pieces[place - 1, 1]), float(pieces[place, 0]), float(values[at]), sigma, p)
     return out
 

@@ -9,7 +9,7 @@ import numpy as np
 from msgspec import structs
 from numpy.typing import NDArray
 from scipy.optimize import nnls
-from scipy.stats import chi2
+from scipy.special import chdtr, chdtri
 
 from acquisition.recording import Recording, Samples, readings_sha256
 from acquisition.recording.rig import ArmModel, rig_sha256
@@ -447,9 +447,9 @@ def _normal_size(squares: Floats, k: int) -> float:
 
     Source: Huber, Robust Statistics, 1981, section 6.4 (proposal 2), with squares cut at 99 % of chi-square.
     """
-    cut = float(chi2.ppf(CUT, k))
-    kept = k * float(chi2.cdf(cut, k + 2)) + cut * (1.0 - CUT)  # mean of the cut chi-square
-    size = float(np.median(squares) / chi2.median(k))
+    cut = float(chdtri(k, 1.0 - CUT))
+    kept = k * float(chdtr(k + 2, cut)) + cut * (1.0 - CUT)  # mean of the cut chi-square
+    size = float(np.median(squares) / chdtri(k, 0.5))
     for _ in range(TURNS):
         size = max(float(np.mean(np.minimum(squares, cut * size))) / kept, 1e-300)
     return size
