@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.fft import irfft, next_fast_len, rfft
+from scipy.fft import next_fast_len
 
 from calibrate.diagnose.streams import limits
 from calibrate.diagnose.streams.track import Track
@@ -96,7 +96,7 @@ def _slid(one: Floats, two: Floats) -> Floats:
     """Products at every lag, the last of `two` on the first of `one` first."""
     count = len(one) + len(two) - 1
     size = next_fast_len(count, real=True)
-    return np.asarray(irfft(rfft(one, size) * rfft(two[::-1], size), size), dtype=np.float64)[:count]
+    return np.fft.irfft(np.fft.rfft(one, size) * np.fft.rfft(two[::-1], size), size)[:count]
 
 
 def _range(values: Floats) -> float:
