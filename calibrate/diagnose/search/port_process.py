@@ -34,6 +34,7 @@ Ints = NDArray[np.intp]
 WAVES = {1: 10, 2: 5}  # of each driver, by their number
 SCALES = (0.15, 0.3, 0.6, 1.2)  # length over half the range of a driver
 LOUDNESS = (0.003, 0.03, 0.3, 3.0, 30.0, 300.0)  # variance of the process over that of the noise
+UNFELT = 1e-18  # of the largest spectral density: below, no feature changes a digit of a gain
 TIME = "time"  # port where all joints are off at once, each by its speed
 CHUNK = 12  # curves that are asked at once
 RIDGE = 1e-9  # of a Gram matrix's mean diagonal: far below what any process amplifies
@@ -103,16 +104,17 @@ class Processes:
         return best - (self._drivers + 1) * np.log(self.rows)
 
     def _of_density(self, density: Floats, gram: Floats, along: Floats, rss: Floats) -> Floats:
-        root = np.sqrt(density / density.sum())
-        w, V = np.linalg.eigh(gram * root[:, None] * root)
+        felt = density > UNFELT * density.max()
+        root = np.sqrt(density[felt] / density.sum())
+        w, V = np.linalg.eigh(gram[:, felt][:, :, felt] * root[:, None] * root)
         w = np.maximum(w, 0.0)
-        turned = np.swapaxes(V, 1, 2) @ (root[:, None] * along)
+        squares = (np.swapaxes(V, 1, 2) @ (root[:, None] * along[:, felt])) ** 2
         level = np.maximum(np.sum(w, axis=1), 1e-300) / self.rows
         best = np.full(along.shape[::2], -np.inf)
         for loud in LOUDNESS:
             ratio = (loud / level)[:, None]
             shrunk = ratio / (1.0 + ratio * w)
-            left = np.maximum(rss - np.sum(shrunk[:, :, None] * turned**2, axis=1), 1e-12 * rss)
+            left = np.maximum(rss - (shrunk[:, None] @ squares)[:, 0], 1e-12 * rss)
             gain = self.rows * np.log(rss / left) - np.sum(np.log1p(ratio * w), axis=1)[:, None]
             best = np.maximum(best, gain)
         return best
