@@ -41,7 +41,7 @@ def solved(bench: Bench, term: Term, inner: Floats, without: Removed | None = No
 
 def _solved(bench: Bench, term: Term, inner: Sequence[Floats], without: Removed | None) -> tuple[Floats, Floats]:
     """(value, coefficient) and (value,) of several inner values at once."""
-    columns = np.stack([bench.state.columns(term, one).T for one in inner])
+    columns = bench.state.columns_at(term, inner)
     size = np.linalg.norm(columns, axis=2)
     size = np.where(size > 0.0, size, 1.0)
     unit = columns / size[:, :, None]

@@ -189,47 +189,47 @@ class Fitted:
         return sum(s.minus_two_log_likelihood for s in self.scatters) + float(away @ away + known @ known)
 
     def columns(self, term: Term, inner: Floats) -> Floats:
-        data = [part.reshape(-1, part.shape[-1]) for part in self._felt(term, inner)]
-        rest = len(self.rows.residual) - len(self._labels[0])
-        return np.concatenate([*data, np.zeros((rest, data[0].shape[1]))])
+        return self.columns_at(term, [inner])[0].T
 
-    def _felt(self, term: Term, inner: Floats) -> Sequence[Floats]:
-        """Of each instrument (active row, k, m) whitened, what a term adds.
-
-        A search asks for thousands: where a row follows one sample alone, by what each direction of the port does.
-        """
-        problem, drivers, samples = self.problem, self.drivers, self._followed
-        if samples is None:
-            return problem.whitened(problem.chain.columns(term.port, term.basis(drivers, inner), self.around))
+    def columns_at(self, term: Term, inner: Sequence[Floats]) -> Floats:
+        """A search asks for thousands: where a row follows one sample alone, by what the components of a port do."""
+        drivers, sample, rows = self.drivers, self._labels[0], len(self.rows.residual)
         directions = term.along(drivers) if isinstance(term, Form) else None
-        if not isinstance(term, Form) or directions is None:
-            basis = term.basis(drivers, inner)
-            levers = self._lever(term.port, np.eye(basis.shape[1]))
-            return [lever @ basis[sample] for lever, sample in zip(levers, samples, strict=True)]
-        values, levers = self.listed.function(term, inner), self._lever(term.port, directions)
-        return [
-            (lever[:, :, None, :] * values[sample][:, None, :, None]).reshape(*lever.shape[:2], -1)
-            for lever, sample in zip(levers, samples, strict=True)
-        ]
+        if isinstance(term, Form) and directions is not None and self._single:
+            values = np.swapaxes([self.listed.function(term, one) for one in inner], 1, 2)[:, :, None, sample]
+            lever = directions.T @ self._lever(term.port, len(directions))
+            out = np.empty((len(inner), values.shape[1], len(lever), rows))
+            np.multiply(values, lever, out=out[..., : len(sample)])
+        else:
+            basis = np.stack([term.basis(drivers, one) for one in inner])
+            out = np.empty((len(inner), basis.shape[3], rows))
+            out[..., : len(sample)] = (
+                np.einsum("wr,erwm->emr", self._lever(term.port, basis.shape[2]), basis[:, sample])
+                if self._single
+                else [self._felt(term.port, one) for one in basis]
+            )
+        out[..., len(sample) :] = 0.0
+        return out.reshape(len(inner), -1, rows)
 
     @cached_property
-    def _followed(self) -> list[Ints] | None:
-        """Of each instrument (active row,) the sample that it follows; None where one follows several."""
-        measured = self.session.measured
-        if self.problem.shared is not None or any(m.sample_rows.shape[1] > 1 for m in measured):
-            return None
-        return [m.sample_rows[rows, 0] for m, rows in zip(measured, self.problem.rows, strict=True)]
+    def _single(self) -> bool:
+        """Whether every row follows one sample alone."""
+        return self.problem.shared is None and all(m.sample_rows.shape[1] == 1 for m in self.session.measured)
 
-    def _lever(self, port: Port, directions: Floats) -> list[Floats]:
-        """Of each instrument (active row, k, d) whitened, what directions (width, d) of a port do."""
-        key = (port, directions.tobytes())
-        if key not in self._levers:
-            each = np.broadcast_to(directions, (len(self.around.frames), *directions.shape))
-            self._levers[key] = self.problem.whitened(self.problem.chain.columns(port, each, self.around))
-        return self._levers[key]
+    def _felt(self, port: Port, basis: Floats) -> Floats:
+        """(m, data row) whitened, what a port adds by a basis (sample, width, m)."""
+        parts = self.problem.whitened(self.problem.chain.columns(port, basis, self.around))
+        return np.concatenate([part.reshape(-1, part.shape[-1]) for part in parts]).T
+
+    def _lever(self, port: Port, width: int) -> Floats:
+        """(width, data row) whitened, what each component of a port does."""
+        if port not in self._levers:
+            each = np.broadcast_to(np.eye(width), (len(self.around.frames), width, width))
+            self._levers[port] = np.ascontiguousarray(self._felt(port, each))
+        return self._levers[port]
 
     @cached_property
-    def _levers(self) -> dict[tuple[Port, bytes], list[Floats]]:
+    def _levers(self) -> dict[Port, Floats]:
         return {}
 
     def candidates(self) -> Sequence[Term]:

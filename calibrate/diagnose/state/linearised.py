@@ -94,6 +94,10 @@ class State(Protocol):
         """(row, coefficient) whitened derivative of expected by a term's coefficients at zero; zero in prior rows."""
         ...
 
+    def columns_at(self, term: Term, inner: Sequence[Floats]) -> Floats:
+        """(inner, coefficient, row) the same at several values of the inner parameters."""
+        ...
+
     def candidates(self) -> Sequence[Term]:
         """All terms that the session allows, drivers refreshed from this state."""
         ...

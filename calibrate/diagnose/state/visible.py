@@ -119,14 +119,15 @@ class Menu:
 def menu_of(state: State, terms: Sequence[Term], sight: Sight) -> Menu:
     """Every term at every value of its grids."""
     entries: list[Entry] = []
-    columns: list[Floats] = []
+    columns: dict[int, list[Floats]] = {}  # by their number
+    widths: list[int] = []
     for index, term in enumerate(terms):
-        for inner in grid_of(term):
-            found = state.columns(term, inner)
-            entries.append(Entry(index, inner))
-            columns.append(found)
-    widths = np.array([c.shape[1] for c in columns], dtype=np.intp)
-    blocks = tuple(_block(np.flatnonzero(widths == k), columns, sight) for k in np.unique(widths) if k > 0)
+        if grid := grid_of(term):
+            found = state.columns_at(term, grid)
+            columns.setdefault(found.shape[1], []).append(found)
+            widths += [found.shape[1]] * len(grid)
+            entries += [Entry(index, inner) for inner in grid]
+    blocks = tuple(_block(np.flatnonzero(np.equal(widths, k)), columns.pop(k), sight) for k in sorted(columns) if k > 0)
     return Menu(tuple(terms), tuple(entries), blocks, sight)
 
 
@@ -156,15 +157,15 @@ def grid_of(term: Term) -> list[Floats]:
 
 def _block(chosen: Ints, columns: list[Floats], sight: Sight) -> EntryBlock:
     """Takes its columns out of the list: all candidates at once are most of what a diagnosis holds."""
-    raw = np.empty((len(chosen), columns[chosen[0]].shape[1], columns[chosen[0]].shape[0]))
-    for at, i in enumerate(chosen):
-        raw[at] = columns[i].T
-        columns[i] = np.zeros((0, 0))
-    size = np.sqrt(np.einsum("ekr,ekr->ek", raw, raw))  # without a copy of them all
-    raw /= np.where(size > 0.0, size, 1.0)[:, :, None]
-    flat = raw.reshape(-1, raw.shape[2])
-    absorbed = (flat @ sight.basis).reshape(*raw.shape[:2], -1)
-    along = (flat @ sight.residual).reshape(raw.shape[:2])
+    raw, at = np.empty((len(chosen), columns[0].shape[1], len(sight.residual))), 0
+    size = np.empty(raw.shape[:2])
+    while columns:
+        part = columns.pop(0)
+        mine = slice(at, at := at + len(part))
+        size[mine] = np.sqrt(np.einsum("ekr,ekr->ek", part, part))  # without a copy of them all
+        np.divide(part, np.where(size[mine] > 0.0, size[mine], 1.0)[:, :, None], out=raw[mine])
+    products = (raw.reshape(-1, raw.shape[2]) @ np.column_stack([sight.basis, sight.residual])).reshape(*size.shape, -1)
+    absorbed, along = products[:, :, :-1], products[:, :, -1]
     gram = raw @ np.swapaxes(raw, 1, 2) - absorbed @ np.swapaxes(absorbed, 1, 2)
     return EntryBlock(chosen, size, raw, absorbed, along, gram)
 

@@ -210,6 +210,9 @@ class LinearSession:
         data = scale * (self.lever @ term.basis(self.drivers, inner))[self.active]
         return np.concatenate([data.reshape(-1, data.shape[-1]), np.zeros((self.geometry.shape[-1], data.shape[-1]))])
 
+    def columns_at(self, term: Term, inner: Sequence[Floats]) -> Floats:
+        return np.stack([self.columns(term, one).T for one in inner])
+
     def candidates(self) -> Sequence[Term]:
         return self.terms
 
