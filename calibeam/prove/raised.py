@@ -48,14 +48,14 @@ def _always(**changes: Any) -> Callable[[Generator], dict[str, Any]]:
 
 def _few(rng: Generator) -> dict[str, Any]:
     enr = float(rng.uniform(PLAIN_IN_FEW, 2.0 * PLAIN_IN_FEW))
-    return {"samples": int(rng.integers(12, 20)), "enr": enr, "at_least": 0.95 * PLAIN_IN_FEW}
+    return {"samples": int(rng.integers(16, 20)), "enr": enr, "at_least": 0.95 * PLAIN_IN_FEW}
 
 
 def _hidden(*names: str, families: tuple[Family, ...]) -> Mapping[Family, tuple[tuple[str, ...], ...]]:
     return dict.fromkeys(families, (names,))
 
 
-PLAIN_IN_FEW = 3.0  # effect over noise
+PLAIN_IN_FEW = 6.0  # effect over noise
 REPLAYED = "three-targets"  # `reconcile` is asked, too
 FEW_ROWS = "few-rows"
 OF_JOINTS = (("soft-joint",), ("slack-drive",), ("encoder-eccentricity",))

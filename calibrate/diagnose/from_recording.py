@@ -35,6 +35,7 @@ from calibrate.diagnose.stages import (
     Stages,
 )
 from calibrate.diagnose.state.fitted import Fitted, fit_geometry
+from calibrate.diagnose.state.noise_of_fit import freedom
 from calibrate.diagnose.state.session import Session, session_of
 from calibrate.fit.identify.session import columns_of
 from calibrate.model.checks.gross_error import GrossError, GrossErrorKind, err_alike, postures
@@ -45,6 +46,8 @@ from calibrate.model.sensors.encoder_difference import NAME as ENCODER_DIFFERENC
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
+
+NOT_SEPARATED = "no cause can be separated from noise; measure more poses"
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,9 +94,8 @@ def diagnose_samples(
     if cleared.whole_file:
         return Diagnosed(cleared, cleared.blunders, None)
     if len(cleared.rows) < limits.FEWEST_SAMPLES:
-        few = f"{len(cleared.rows)} samples are left to diagnose, fewer than {limits.FEWEST_SAMPLES}"
-        why = f"{few}: no cause can be separated from noise; measure more poses"
-        return Diagnosed(cleared, cleared.blunders, None, (Incomplete(Stage.SEARCH, why),))
+        few = f"{len(cleared.rows)} samples are left to diagnose, fewer than {limits.FEWEST_SAMPLES}: {NOT_SEPARATED}"
+        return Diagnosed(cleared, cleared.blunders, None, (Incomplete(Stage.SEARCH, few),))
     geometry = stages.attempt(Stage.GEOMETRY, lambda: begin(session_of(rig, cleared.samples)), None, refuses=True)
     if geometry is None:
         return Diagnosed(cleared, cleared.blunders, None, stages.failed)
@@ -104,7 +106,11 @@ def diagnose_samples(
         if known is not None:
             known(Diagnosed(cleared, cleared.blunders, Physics(found, geometry, _fitted(found), None)))
 
+    if few := _too_few(geometry):
+        return Diagnosed(cleared, cleared.blunders, None, (*stages.failed, Incomplete(Stage.SEARCH, few)))
     diagnosis = diagnose(geometry, rng, missing_of(geometry.drivers), stages, causes)
+    if geometry.samples < limits.FEWEST_FOR_NAMES:
+        diagnosis = replace(diagnosis, findings=tuple(map(doubtful, diagnosis.findings)))
     model = geometry if not diagnosis.findings else _fitted(diagnosis)
     attempt = stages.attempt
     diagnosis = attempt(Stage.BEYOND_NOISE, lambda: _with_noise(diagnosis, model, rng), diagnosis)
@@ -113,6 +119,17 @@ def diagnose_samples(
     diagnosis = _with_unexplained(diagnosis, together)
     physics = Physics(unfinished(diagnosis, stages.failed), geometry, model, change)
     return Diagnosed(cleared, cleared.blunders + left, physics)
+
+
+def _too_few(geometry: Fitted) -> str:
+    """Why no cause is sought, where few samples leave next to nothing beside the geometry; else nothing."""
+    if geometry.samples >= limits.FEWEST_FOR_NAMES:
+        return ""
+    each = zip(geometry.session.measured, geometry.problem.rows, strict=True)
+    numbers = [len(rows) * m.problem.observed.shape[1] for m, rows in each]
+    left = float(np.sum(numbers / freedom(geometry.problem, geometry.values, geometry.covariance)))
+    few = f"{geometry.samples} samples leave {left:.0f} numbers beside the geometry, fewer than {limits.FEWEST_LEFT}"
+    return f"{few}: {NOT_SEPARATED}" if left < limits.FEWEST_LEFT else ""
 
 
 def _another_arm(geometry: Fitted) -> GrossError | None:

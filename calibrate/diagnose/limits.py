@@ -17,9 +17,14 @@ TIME_FACTOR = 1.2  # factor on what noise gives; less decides nothing
 RUN_ALPHA = 1e-3  # probability; of a run of gross errors at random: a session in a thousand
 
 # What can be diagnosed
-# samples; with fewer, no term can be separated from noise. docs/proof.md, `few-rows`: such sessions end as
-# `undecidable`
-FEWEST_SAMPLES = 20
+# samples; with fewer, no term can be separated from noise: such sessions end as `undecidable`. A cause
+# of 6 to 12 times the noise was found in 4 of 14 drawn sessions of 11 to 15 rows, in 39 of 40 of 16 to 19
+# (docs/proof.md, `few-rows`)
+FEWEST_SAMPLES = 16
+# samples; with fewer, no name is more likely than not, no unknown cause is sought and nothing is called consistent: a
+# curve or two more leave next to no residual that would show the noise
+FEWEST_FOR_NAMES = 20
+FEWEST_LEFT = 12  # numbers that geometry leaves free, where samples are fewer than `FEWEST_FOR_NAMES`
 # share of the reach; where half of the readings are farther off the fitted arm, the rig file describes another arm: no
 # physics moves an arm so far
 FAR_OF_REACH = 0.02

@@ -13,6 +13,7 @@ from itertools import combinations
 import numpy as np
 
 from calibrate.diagnose.doubts import limits
+from calibrate.diagnose.limits import FEWEST_FOR_NAMES
 from calibrate.diagnose.search import limits as search_limits
 from calibrate.diagnose.search.bench import Bench
 from calibrate.diagnose.search.noise_law import NoiseLaw, noise_law
@@ -28,6 +29,7 @@ from calibrate.diagnose.search.open_families import (
 from calibrate.diagnose.search.score import gain_of, removed
 from calibrate.diagnose.search.search import grown_out, settled
 from calibrate.diagnose.search.searching import Key, Search, cause_of, holds
+from calibrate.errors import DataError
 from calibrate.model.effects.curve import SmoothCurve
 from calibrate.model.effects.ports import Place
 from calibrate.model.effects.term import Accepted, Term
@@ -47,7 +49,12 @@ class Case:
 
 
 def with_unknowns(at: Search) -> Search:
-    """Names replaced where an open family forbids them, curves added where structure remains."""
+    """Names replaced where an open family forbids them, curves added where structure remains.
+
+    DataError for samples so few that a curve might take all that they leave.
+    """
+    if at.state.samples < FEWEST_FOR_NAMES:
+        raise DataError(f"{at.state.samples} samples, fewer than {FEWEST_FOR_NAMES}: only named causes are sought")
     before, given_up, vanished = at.keys, frozenset[Keys](), frozenset[Key]()
     for _ in range(limits.UNKNOWN_ROUNDS):
         changed, gone = _forbidden(at, open_families(at.bench), given_up)

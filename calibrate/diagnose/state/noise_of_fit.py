@@ -11,7 +11,8 @@ from calibrate.fit.identify.session import assumed_sigma
 from calibrate.fit.noise import Scatter, SharedScatter, levers_of, likelihood_of, scatter_of, shares_found, witness_of
 from calibrate.fit.solvers import Fit
 from calibrate.model.parameters import plausible_sizes
-from calibrate.model.problem import whitener_of
+from calibrate.model.problem import Measured, whitener_of
+from calibrate.model.sensors.catalogue import kind_of
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
@@ -52,7 +53,7 @@ def noise_of(problem: EffectProblem, fit: Fit) -> SessionNoise:
 
     def found(i: int, residual: Floats) -> Scatter:
         rows = problem.rows[i]
-        scatter = scatter_of(residual[rows], by_joint[i][rows], assumed_sigma(measured[i])[rows])
+        scatter = scatter_of(residual[rows], by_joint[i][rows], assumed_sigma(measured[i])[rows], _alike(measured[i]))
         return replace(scatter, covariance=scatter.covariance * larger[i])
 
     witness = witness_of([m.problem.chain for m in measured])
@@ -70,6 +71,13 @@ def noise_of(problem: EffectProblem, fit: Fit) -> SessionNoise:
     return SessionNoise(
         tuple(s if m is None else replace(s, covariance=s.covariance + m[r]) for s, m, r in each), shared
     )
+
+
+def _alike(measured: Measured) -> list[slice]:
+    """Which numbers of a reading have one size of noise where rows are few: every second encoder has its own."""
+    joints = measured.problem.chain.sensor.joints_compared()
+    each = [slice(i, i + 1) for i in range(len(joints))]
+    return each or [quantity.part for quantity in kind_of(measured.name).quantities]
 
 
 def _trust(seen: Scatter, residual: Floats, known: Ints) -> Floats:

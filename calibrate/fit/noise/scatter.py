@@ -31,6 +31,9 @@ Floats = NDArray[np.float64]
 NU = 5.0  # degrees of freedom: a tenth less efficient than least squares on Gaussian data, safe against outlying rows
 TURNS = 20
 SETTLED = 1e-4  # of -2 log L per observation
+# rows; of fewer than an arm has unknowns a fit may reach one coordinate everywhere, whose variance goes to nothing and
+# whose weight hides all others: one size for all coordinates of a quantity
+FEWEST_FOR_FORM = 40
 FLOOR = 1e-6  # of the assumed noise: perfect data have a scale, too
 ROUNDING = 1e-14  # of the largest variance: fewer rows than columns, or one bound to others, leave directions without
 MEDIAN_OF_SIZES = 0.6745  # of |x|, x normal with sigma 1
@@ -57,11 +60,17 @@ def sigma_about_zero(values: Floats, axis: int | None = None) -> Floats:
     return np.asarray(np.median(np.abs(values), axis=axis) / MEDIAN_OF_SIZES, dtype=np.float64)
 
 
-def scatter_of(residual: Floats, by_joint: Floats, own_sigma: Floats) -> Scatter:
-    """Of residuals (row, k) with d reading / d joints (row, k, readings) and assumed own noise (row, k)."""
+def scatter_of(
+    residual: Floats, by_joint: Floats, own_sigma: Floats, quantities: Sequence[slice] = (slice(None),)
+) -> Scatter:
+    """Of residuals (row, k) with d reading / d joints (row, k, readings) and assumed own noise (row, k).
+
+    `quantities`: which of the k numbers are alike, such as lengths and angles; of few rows each has one size.
+    """
     if len(residual) == 0:  # all rows of the instrument are held out
         return Scatter(np.zeros((0, residual.shape[1], residual.shape[1])), np.zeros(0), 0.0, 0)
-    one, other = _of_one_form(residual, own_sigma), _through_joints(residual, by_joint, own_sigma)
+    one = _of_one_form(residual, own_sigma, quantities)
+    other = _through_joints(residual, by_joint, own_sigma)
     cost = np.log(max(len(residual), 2))
     first = one.minus_two_log_likelihood + cost * one.free
     return one if first <= other.minus_two_log_likelihood + cost * other.free else other
@@ -79,8 +88,10 @@ def likelihood_of(residual: Floats, covariance: Floats) -> tuple[float, Floats]:
     return float(np.sum(each)), (NU + k) / (NU + square)
 
 
-def _of_one_form(residual: Floats, own_sigma: Floats) -> Scatter:
+def _of_one_form(residual: Floats, own_sigma: Floats, quantities: Sequence[slice]) -> Scatter:
     n, k = residual.shape
+    one_size = n < FEWEST_FOR_FORM
+    free = len(quantities) if one_size else k * (k + 1) // 2
     z = residual / own_sigma
     form, last = np.diag((sigma_about_zero(z, axis=0) + FLOOR) ** 2), np.inf
     for _ in range(TURNS):
@@ -91,10 +102,19 @@ def _of_one_form(residual: Floats, own_sigma: Floats) -> Scatter:
             break
         last, weights = value, (NU + k) / (NU + square)
         form = (weights[:, None] * z).T @ z / n
+        form = _of_one_size(form, quantities) if one_size else form
         form += max(FLOOR**2, ROUNDING * float(np.trace(form))) * np.eye(k)
     value, weights = likelihood_of(z, np.broadcast_to(form, (n, k, k)))
     covariance = form * own_sigma[:, :, None] * own_sigma[:, None, :]
-    return Scatter(covariance, weights, value + 2.0 * float(np.sum(np.log(own_sigma))), k * (k + 1) // 2)
+    return Scatter(covariance, weights, value + 2.0 * float(np.sum(np.log(own_sigma))), free)
+
+
+def _of_one_size(form: Floats, quantities: Sequence[slice]) -> Floats:
+    out = np.zeros_like(form)
+    for part in quantities:
+        own = np.diagonal(form)[part]
+        out[part, part] = np.eye(len(own)) * np.mean(own)
+    return out
 
 
 def _law(square: Floats, k: int) -> float:

@@ -140,6 +140,25 @@ def test_of_a_handful_of_samples_nothing_is_sought_and_nothing_claimed(recording
     assert [one.stage for one in file.incomplete] == ["search"]
 
 
+def test_of_fewer_than_twenty_rows_a_plain_cause_is_named_but_not_for_certain(tmp_path):
+    """Its rows leave one coordinate of the tracker to the geometry alone, whose weight once hid every cause."""
+    wanted = {"family": "tracker", "arm": "ur5", "defects": ("soft-joint",), "enr": 9.0, "at_least": 6.0}
+    recording = recording_of(tmp_path, seed=10, samples=19, **wanted)
+    hidden = json.loads((tmp_path / "sealed" / "truth.json").read_bytes())["defects"][0]
+    few = diagnose_samples(recording.rig, recording.samples, np.random.default_rng(1))
+    (found,) = few.physics.diagnosis.findings
+    assert (found.name.physics, found.name.where) == ("joint-compliance", hidden["port"])
+    assert 0.0 < found.confidence < 0.5
+    assert "unknown causes" in [one.stage for one in file_of(few, recording).incomplete]
+
+
+def test_few_rows_without_a_cause_are_not_called_consistent(tmp_path):
+    recording = recording_of(tmp_path, family="tracker", arm="ur5", seed=6, samples=19)
+    few = diagnose_samples(recording.rig, recording.samples, np.random.default_rng(1))
+    assert few.physics.diagnosis.findings == ()
+    assert few.physics.diagnosis.verdict is Verdict.UNDECIDABLE
+
+
 def test_an_instrument_may_have_all_its_rows_held_out(tmp_path):
     """A bar measured in one go is gone when that part of the session is: the rest is still judged."""
     recording = recording_of(tmp_path, family="cones", seed=72, samples=160)

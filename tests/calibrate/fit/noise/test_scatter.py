@@ -17,6 +17,19 @@ def test_columns_that_follow_others_have_a_noise_too() -> None:
     assert np.all(np.abs(np.log(spread / residual.std(axis=0))) < 0.3)
 
 
+@pytest.mark.parametrize("alike", [[slice(None)], [slice(0, 3), slice(3, 6)]])
+def test_of_few_rows_a_coordinate_that_a_fit_reaches_everywhere_is_no_better_than_the_others(alike) -> None:
+    """Fewer rows than an arm has unknowns: one coordinate may be fitted exactly, and would have all the weight."""
+    k = alike[-1].stop or 3
+    residual = np.random.default_rng(4).standard_normal((19, k)) * np.repeat([1.0, 20.0], 3)[:k]
+    residual[:, 2] = 0.0
+    found = scatter_of(residual, np.zeros((19, k, 1)), np.ones((19, k)), alike)
+    each = np.sqrt(np.diagonal(found.covariance, axis1=1, axis2=2)).mean(axis=0)
+    for part in alike:
+        assert each[part] == pytest.approx(each[part][0])
+    assert each[-1] / each[0] == pytest.approx(20.0 if len(alike) > 1 else 1.0, rel=0.5)
+
+
 def test_a_gross_error_is_not_tame_and_readings_of_which_each_seems_wild_all_are() -> None:
     misfit = np.random.default_rng(2).standard_normal((40, 3))
     misfit[7] *= 100.0
