@@ -27,7 +27,9 @@ Indices = NDArray[np.intp]
 
 SOURCE = Path(__file__).with_name("fast.py")
 PER_PART = 7  # slots of a perturbed part: shift 3, turn 3, and the angle of the joint behind it
-WORTH_POSES = 600  # below, a single fit is over before numba is imported and loaded (0.4 to 0.5 s, once a process)
+# below, numba (0.4 to 0.5 s and 105 MB, once a process) is not worth loading: a diagnosis of 1,000 rows takes as long
+# with it as without
+WORTH_POSES = 2000
 
 
 @dataclass(frozen=True)
