@@ -31,7 +31,6 @@ from calibrate.model.predict import (
     readings,
     residuals,
 )
-from calibrate.model.problem import Measured
 from calibrate.model.rigid import cross_matrix, inverse, transform
 from calibrate.model.sensors.catalogue import kind_of
 from calibrate.model.with_effects.acting import (
@@ -41,8 +40,8 @@ from calibrate.model.with_effects.acting import (
     moved_columns,
 )
 from calibrate.model.with_effects.applied import Applied, effects_at
-from calibrate.model.with_effects.chain import twists_by_arm
-from calibrate.model.with_effects.ported_chain import look, offsets
+from calibrate.model.with_effects.chain import Chain, twists_by_arm
+from calibrate.model.with_effects.ported_chain import offsets
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
@@ -230,7 +229,7 @@ def _of_values(
     rows = len(by.joints_rad)
     if model.covariance is None:
         return {c: np.full(rows, np.nan) for c in columns}
-    own = _by_name(found)
+    own = {name: (one.port, one.by_value[..., j]) for one in found for j, name in enumerate(one.names)}
     slopes: list[Columns] = []
     for name in model.covariance.names:
         if name in own:
@@ -246,18 +245,6 @@ def _of_values(
     for c in columns:
         J = np.nan_to_num(np.stack([slope[c] for slope in slopes], axis=1)) if slopes else np.zeros((rows, 0))
         out[c] = np.einsum("ni,ij,nj->n", J, C, J) if slopes else np.zeros(rows)
-    return out
-
-
-def _by_name(found: Sequence[Acting]) -> dict[str, tuple[Port, Floats]]:
-    """Name in the covariance -> port, and (row, width) that one unit of the value adds there."""
-    out: dict[str, tuple[Port, Floats]] = {}
-    for one in found:
-        smooth = [spec.name for spec in one.carried.accepted.term.inner if not spec.discrete]
-        effect = one.carried.record
-        names = [*effect.coefficients, *(f"{effect.name}.{name}" for name in smooth)]
-        for j, name in enumerate(names):
-            out[name] = (one.port, one.by_value[..., j])
     return out
 
 
@@ -343,16 +330,13 @@ def without_effects(weighting: Weighting, theta: Floats, samples: Samples, model
         return weighting
     predictor = Predictor.of(model)
     by, q = effects_at(model, predictor, samples, same_session=True, doubts_too=False).by, samples.joints()
-    arm, nothing = arm_in(predictor), Perturbation.none(len(samples), samples.n_joints)
-    plain, moved = (flange_frames(arm, predictor, q, one) for one in (nothing, by))
-
-    def less(i: int, m: Measured) -> Measured:
-        own = weighting.unweighted.of_block(i, theta)
-        added = look(m, own, moved).expected - look(m, own, plain).expected
-        if (channels := m.encoder_channels) is not None:
-            added = added + by.between_rad[np.ix_(m.sample_rows[:, -1], channels)]
-        if m.name in by.readings:
-            added = added + by.readings[m.name][m.sample_rows[:, -1]]
-        return replace(m, problem=replace(m.problem, observed=m.problem.observed - added))
-
-    return replace(weighting, measured=tuple(less(i, m) for i, m in enumerate(weighting.measured)))
+    unknowns, nothing = weighting.unweighted.unknowns, Perturbation.none(len(samples), samples.n_joints)
+    chain = Chain(arm_in(predictor), predictor.at_shafts(q), weighting.measured, unknowns)
+    plain, moved = (chain.under(theta, one).expected for one in (nothing, by))
+    return replace(
+        weighting,
+        measured=tuple(
+            replace(m, problem=replace(m.problem, observed=m.problem.observed - (b - a)))
+            for m, a, b in zip(weighting.measured, plain, moved, strict=True)
+        ),
+    )

@@ -102,9 +102,7 @@ def _over(
     left = {e.after: e.name for e in model.effects if e.after}
 
     def shift(found: Sequence[Acting]) -> Floats:
-        by = nothing
-        for one in found:
-            by = by.plus(one.port, one.amount)
+        by = Perturbation.of_all(len(samples), samples.n_joints, (one.added for one in found))
         moved, plain = (flange_frames(arm_in(predictor), predictor, q, p)[:, -1] for p in (by, nothing))
         return predictor.tip_at(moved) - predictor.tip_at(plain)
 

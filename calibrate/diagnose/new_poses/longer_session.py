@@ -67,7 +67,7 @@ class Elsewhere:
         term = self._terms.get(accepted.term.key)
         if term is None:
             return None
-        was = accepted.term.amount(self.state.drivers, accepted.coefficients, accepted.inner)
+        was = accepted.at(self.state.drivers)
         same, _ = alike(term.basis(self.drivers, accepted.inner)[: len(was)], was[..., None])
         return Accepted(term, same[:, 0], accepted.inner)
 
@@ -91,7 +91,7 @@ class Elsewhere:
 
     def added(self, accepted: Accepted) -> tuple[Floats, Floats]:
         """What a carried term adds to the readings: (row,) of the measured rows, (pose, k) of the new ones."""
-        amount = accepted.term.amount(self.drivers, accepted.coefficients, accepted.inner)[..., None]
+        amount = accepted.at(self.drivers)[..., None]
         columns = columns_of(self.session.measured, accepted.term.port, amount, self.around)
         seen = self._problem().whitened(columns)
         measured, new = self._parted(seen)

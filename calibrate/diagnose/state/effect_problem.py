@@ -81,12 +81,9 @@ class EffectProblem:
                 else Parameter(f"term{i}.c{j}", "1", 1.0, free=False)
                 for j, s in enumerate(self.sizes[i])
             ]
-            for inner in accepted.term.inner:
-                if not inner.discrete:
-                    width = inner.upper - inner.lower
-                    out.append(
-                        Parameter(f"term{i}.{inner.name}", "1", 0.1 * width, lower=inner.lower, upper=inner.upper)
-                    )
+            for inner in (accepted.term.inner[j] for j in accepted.term.smooth):
+                width = inner.upper - inner.lower
+                out.append(Parameter(f"term{i}.{inner.name}", "1", 0.1 * width, lower=inner.lower, upper=inner.upper))
         return tuple(out)
 
     @cached_property
@@ -94,8 +91,7 @@ class EffectProblem:
         """(parameter,) index of the term that it belongs to, those given not counted, -1: geometry or given."""
         out = [np.full(len(self.session.parameters), -1, dtype=np.intp)]
         for i, accepted in enumerate(self.terms):
-            smooth = sum(not inner.discrete for inner in accepted.term.inner)
-            out.append(np.full(len(accepted.coefficients) + smooth, max(i - self.given, -1), dtype=np.intp))
+            out.append(np.full(len(accepted.values), max(i - self.given, -1), dtype=np.intp))
         return np.concatenate(out)
 
     def from_geometry(self, geometry: Floats) -> Floats:

@@ -305,7 +305,7 @@ def _effect(
         sizes = stated
     else:
         inner_sigma = np.zeros(len(a.inner))
-        inner_sigma[[not s.discrete for s in term.inner]] = np.sqrt(np.maximum(np.diag(own)[m:], 0.0))
+        inner_sigma[term.smooth] = np.sqrt(np.maximum(np.diag(own)[m:], 0.0))
         sizes = term.sizes(a.coefficients, own[:m, :m], a.inner, inner_sigma)
     depends_on = ",".join(term.depends_on)
     values = {driver: range_of(drivers, driver) for driver in depends_on.split(",")}
@@ -496,7 +496,7 @@ def _as_listed(
         effects = [
             structs.replace(e, coefficients=turned) if effects[i].name in (e.name, e.after) else e for e in effects
         ]
-        at += m + sum(not s.discrete for s in a.term.inner)
+        at += len(a.values)
     turned_covariance = covariance_record(parameters, turn @ covariance @ turn.T)
     return structs.replace(model, effects=tuple(effects), covariance=turned_covariance)
 

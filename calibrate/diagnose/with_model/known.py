@@ -112,7 +112,7 @@ def _later(model: ModelFile, session: Session) -> Fitted:
         return effects_at(model, Predictor.of(model), _with_moves(samples), same_session=False).found
 
     acting_here = found_at(session.samples)
-    names = [p.name for p in session.parameters] + [name for one in acting_here for name in _names(one)]
+    names = [p.name for p in session.parameters] + [name for one in acting_here for name in one.names]
     mine = {p.name for p in session.parameters if p.free and not p.name.startswith(ANEW)}
     mine |= set(names[len(session.parameters) :])
     known = [name for name in model.covariance.names if name in mine]
@@ -145,12 +145,6 @@ def _apart(name: str, then: dict[str, tuple[float, ...]], now: dict[str, tuple[f
     return then[what][AXES.index(axis)] - now[what][AXES.index(axis)]
 
 
-def _names(one: Acting) -> list[str]:
-    """Of what each column of `by_value` stands for, as in the covariance."""
-    effect, inner = one.carried.record, one.carried.accepted.term.inner
-    return [*effect.coefficients, *(f"{effect.name}.{spec.name}" for spec in inner if not spec.discrete)]
-
-
 def _stated(one: Acting, k: int, found_at: Callable[[Samples], tuple[Acting, ...]]) -> Accepted:
     """Number `k` of those that are found at the rows of any samples."""
 
@@ -159,9 +153,7 @@ def _stated(one: Acting, k: int, found_at: Callable[[Samples], tuple[Acting, ...
         return there.by_value, there.amount
 
     accepted = one.carried.accepted
-    smooth = [value for spec, value in zip(accepted.term.inner, accepted.inner, strict=True) if not spec.discrete]
-    values = np.concatenate([accepted.coefficients, np.array(smooth, dtype=np.float64)])
-    term = accepted.term
+    term, values = accepted.term, accepted.values
     stated = Stated(
         term.port,
         (RECORDING,),

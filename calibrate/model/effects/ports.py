@@ -4,6 +4,7 @@ A port states where in `Perturbation` a term acts and how many components it has
 arms.serial.SerialArm: B_0 in front of joint 1, joint i turns about z of B_(i-1), B_n is the flange.
 """
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import Enum
 
@@ -63,6 +64,14 @@ class Perturbation:
             {},
             np.zeros((poses, joints)),
         )
+
+    @classmethod
+    def of_all(cls, poses: int, joints: int, added: Iterable[tuple[Port, Floats]]) -> "Perturbation":
+        """Of amounts (pose, width of the port), each added at a port."""
+        out = cls.none(poses, joints)
+        for port, amount in added:
+            out = out.plus(port, amount)
+        return out
 
     def of(self, samples: Ints) -> "Perturbation":
         """Of some of the poses."""

@@ -28,6 +28,7 @@ Functions = Callable[[Drivers, Floats], Floats]  # (pose, m) or (pose, width, m)
 # (pose, 1 or width) for coefficients (m,) and inner values (inner,)
 Exact = Callable[[Drivers, Floats, Floats], Floats]
 Plausible = Callable[[Floats, Floats], bool]  # of coefficients (m,) and inner values (inner,)
+INNER_STEP = 1e-3  # of the range of an inner value, for its difference quotient
 NOISE_ALLOWS = 30.0  # times the data's own noise: a coarse machine may be worse than a limit for good ones
 
 
@@ -106,6 +107,11 @@ class Term(ABC):
     def key(self) -> tuple[str, tuple[str, ...], str, int | None, str, str]:
         """What makes it the same term."""
         return (self.port.where, self.depends_on, self.shape.value, self.order, self.physics, self.variant)
+
+    @property
+    def smooth(self) -> list[int]:
+        """Numbers of the inner values that a fit moves."""
+        return [j for j, spec in enumerate(self.inner) if not spec.discrete]
 
 
 class Holds(Enum):
@@ -210,6 +216,27 @@ class Accepted:
     term: Term
     coefficients: Floats  # (coefficient,)
     inner: Floats  # (inner,)
+
+    @property
+    def values(self) -> Floats:
+        """(value,) coefficients, then smooth inner values."""
+        return np.concatenate([self.coefficients, self.inner[self.term.smooth]])
+
+    def at(self, drivers: Drivers) -> Floats:
+        """(pose, width) what it adds at its port."""
+        return self.term.amount(drivers, self.coefficients, self.inner)
+
+    def by_inner(self, amount: Callable[[Floats], Floats]) -> list[Floats]:
+        """Of each smooth inner value (pose, width, 1), by a difference quotient of the amount (pose, width) at inner
+        values (inner,).
+        """
+        out: list[Floats] = []
+        for j in self.term.smooth:
+            low, high, spec = self.inner.copy(), self.inner.copy(), self.term.inner[j]
+            step = INNER_STEP * (spec.upper - spec.lower)
+            low[j], high[j] = low[j] - step / 2.0, high[j] + step / 2.0
+            out.append(((amount(high) - amount(low)) / step)[..., None])
+        return out
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ from calibrate.model.arms.catalogue import arm_of
 from calibrate.model.arms.serial import SerialArm
 from calibrate.model.effect_records import EffectRecord
 from calibrate.model.effects.catalogue import EFFECTS
-from calibrate.model.effects.conditions import temperatures_of
+from calibrate.model.effects.conditions import conditions_of, temperatures_of, uncoupled_samples
 from calibrate.model.effects.curve import cause, curve
 from calibrate.model.effects.drivers import Drivers, Readout
 from calibrate.model.effects.gravity import likely_torque_nm
@@ -27,14 +27,13 @@ from calibrate.model.effects.term import Accepted, Form, Shape, Term
 from calibrate.model.predict import Predictor, readings
 from calibrate.model.sensors.catalogue import kind_of
 from calibrate.model.sensors.encoder_difference import NAME as ENCODER_DIFFERENCE
-from calibrate.model.with_effects.driver_values import drivers_at, readout_at
+from calibrate.model.with_effects.driver_values import readout_at
 from calibrate.model.with_effects.new_poses import alike, rearranged
 from calibrate.model.with_effects.ported_chain import perturbed_frames
 
 Floats = NDArray[np.float64]
 
 TURNS = 3  # drivers follow the frames that the effects have moved; each turn leaves a thousandth of a change
-STEP = 1e-3  # of an inner value, for its difference quotient
 SAME = 1e-6  # of a basis: then the exact formula has the same meaning as in the session
 UNIFORM = np.sqrt(3.0)  # half the width of a uniform law over its standard deviation
 CARRIED = 0.05  # of an effect's size: more may not be lost where its columns are chosen again (new_poses.py)
@@ -67,6 +66,16 @@ class Acting:
     def port(self) -> Port:
         return self.carried.accepted.term.port
 
+    @property
+    def added(self) -> tuple[Port, Floats]:
+        return self.port, self.amount
+
+    @property
+    def names(self) -> list[str]:
+        """Of the values of `by_value`, as in the covariance of the model."""
+        effect, term = self.carried.record, self.carried.accepted.term
+        return [*effect.coefficients, *(f"{effect.name}.{term.inner[j].name}" for j in term.smooth)]
+
 
 def listed(effects: Sequence[EffectRecord], drivers: Drivers) -> tuple[Carried, ...]:
     """Each effect with its term. DataError for one that the catalogue does not list for this session."""
@@ -93,7 +102,8 @@ def drivers_under(predictor: Predictor, samples: Samples, by: Perturbation) -> D
     frames = flange_frames(arm_in(predictor), predictor, samples.joints(), by)
     place = {f"temp_{k}_degC": k for k in temperatures_of(samples)}
     as_recorded = {k: samples.column(c) for c, k in place.items()}  # smoothed already
-    return drivers_at(predictor.rig, samples, frames, _readouts(predictor, samples, frames, by), as_recorded)
+    taken, readouts = conditions_of(uncoupled_samples(predictor.rig.arm, samples), as_recorded), _readouts
+    return Drivers(**vars(taken), rig=predictor.rig, frames=frames, readouts=readouts(predictor, samples, frames, by))
 
 
 def acting(carried: Sequence[Carried], predictor: Predictor, recorded: Samples, both: Samples) -> tuple[Acting, ...]:
@@ -106,10 +116,9 @@ def acting(carried: Sequence[Carried], predictor: Predictor, recorded: Samples, 
         new = replace(drivers_under(predictor, both, by_new), session_rows=n)
         amounts = [_amount(c, old) for c in carried]
         out = tuple(_acting(c, old, new, amount) for c, amount in zip(carried, amounts, strict=True))
-        by_old, by_new = Perturbation.none(n, joints), Perturbation.none(len(both), joints)
-        for one, amount in zip(out, amounts, strict=True):
-            by_old = by_old.plus(one.port, amount)
-            by_new = by_new.plus(one.port, np.concatenate([amount, one.amount]))
+        of_session = [(one.port, amount) for one, amount in zip(out, amounts, strict=True)]
+        of_both = [(one.port, np.concatenate([was, one.amount])) for one, was in zip(out, amounts, strict=True)]
+        by_old, by_new = Perturbation.of_all(n, joints, of_session), Perturbation.of_all(len(both), joints, of_both)
     return out
 
 
@@ -174,15 +183,13 @@ def _acting(carried: Carried, old: Drivers, new: Drivers, was: Floats) -> Acting
         order = np.arange(len(new.q_rad))
         order[n:][outside] = nearest
         new = rearranged(new, order)
-    basis, exact = _basis(carried, old, new)
-    parts = [basis]
-    for j, spec in enumerate(carried.accepted.term.inner):
-        if not spec.discrete:
-            parts.append(_by_inner(carried, old, new, j, STEP * (spec.upper - spec.lower))[..., None])
-    amount = basis @ carried.accepted.coefficients if exact is None else exact
+    a, (basis, exact) = carried.accepted, _basis(carried, old, new)
+    linear = basis @ a.coefficients
+    by_inner = a.by_inner(lambda inner: _basis(carried, old, new, inner)[0] @ a.coefficients)
     spread = np.cov(was, rowvar=False).reshape(2 * (was.shape[1],))
-    undated = _undated(carried, old, new, basis @ carried.accepted.coefficients)
-    return Acting(carried, amount, np.concatenate(parts, axis=-1), outside, spread, undated)
+    undated = _undated(carried, old, new, linear)
+    by_value = np.concatenate([basis, *by_inner], axis=-1)
+    return Acting(carried, linear if exact is None else exact, by_value, outside, spread, undated)
 
 
 def _undated(carried: Carried, old: Drivers, new: Drivers, amount: Floats) -> Floats:
@@ -255,14 +262,6 @@ def _of_both(carried: Carried, new: Drivers, values: Floats) -> Floats:
     except ValueError:  # its own rows and the new ones are of different number
         pass
     return listed([carried.record], new)[0].accepted.term.basis(new, values)
-
-
-def _by_inner(carried: Carried, old: Drivers, new: Drivers, j: int, step: float) -> Floats:
-    """(asked, width)"""
-    shift = np.zeros(len(carried.accepted.inner))
-    shift[j] = step / 2.0
-    up, down = (_basis(carried, old, new, carried.accepted.inner + s * shift)[0] for s in (1.0, -1.0))
-    return (up - down) @ carried.accepted.coefficients / step
 
 
 def _beyond(carried: Carried, old: Drivers, new: Drivers) -> tuple[NDArray[np.bool_], NDArray[np.intp]]:

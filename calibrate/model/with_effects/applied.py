@@ -205,9 +205,7 @@ def effects_at(
         filled = _at_the_end(filled, model.session.last_t_s)
     both = joined(recorded, filled.samples)
     found = acting(carried, predictor, recorded, both)
-    by = nothing
-    for one in found:
-        by = by.plus(one.port, one.amount)
+    by = Perturbation.of_all(len(samples), samples.n_joints, (one.added for one in found))
     if not doubts_too:
         return Applied(by, found, (), ("",) * len(samples), notes)
     doubts = [*_of_range(found), *((one.port, one.undated) for one in found if np.any(one.undated))]

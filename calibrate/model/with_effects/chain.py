@@ -34,7 +34,6 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 
 NEAR = 1e-5  # m, rad: directions that the data hardly see are differences of columns that are large by themselves
-INNER_STEP = 1e-3  # of the range of an inner parameter, for its difference quotient
 PART_STEP = 1e-3  # m, rad: whether a part of the arm follows a parameter at all
 KEPT = 8  # arms of which that is remembered
 FEW = 0.9  # of the samples: where a fit sees fewer, derivatives are computed of those alone
@@ -166,11 +165,7 @@ class Chain:
     @property
     def of_effects(self) -> Floats:
         """(value,) that the effects came with."""
-        parts = [np.zeros(0)]
-        for accepted in self.terms:
-            smooth = [not inner.discrete for inner in accepted.term.inner]
-            parts += [accepted.coefficients, accepted.inner[np.array(smooth, dtype=bool)]]
-        return np.concatenate(parts)
+        return np.concatenate([np.zeros(0), *(accepted.values for accepted in self.terms)])
 
     def split(self, values: Floats) -> tuple[Floats, tuple[Accepted, ...]]:
         """Geometry (param,), and the terms with these values."""
@@ -178,13 +173,11 @@ class Chain:
         out: list[Accepted] = []
         at = n
         for accepted in self.terms:
-            m = len(accepted.coefficients)
-            coefficients, at = values[at : at + m], at + m
+            end, smooth = at + len(accepted.coefficients), accepted.term.smooth
             inner = accepted.inner.copy()
-            for j, spec in enumerate(accepted.term.inner):
-                if not spec.discrete:
-                    inner[j], at = values[at], at + 1
-            out.append(Accepted(accepted.term, coefficients, inner))
+            inner[smooth] = values[end : end + len(smooth)]
+            out.append(Accepted(accepted.term, values[at:end], inner))
+            at = end + len(smooth)
         return values[:n], tuple(out)
 
     def at(self, values: Floats, known: Evaluations | None = None) -> ChainAt:
@@ -228,10 +221,11 @@ class Chain:
 
     def _at(self, values: Floats) -> ChainAt:
         geometry, terms = self.split(values)
-        by = Perturbation.none(len(self.q_rad), self.arm.n_joints)
-        for accepted in terms:
-            amount = accepted.term.amount(self._drivers, accepted.coefficients, accepted.inner)
-            by = by.plus(accepted.term.port, amount)
+        added = ((accepted.term.port, accepted.at(self._drivers)) for accepted in terms)
+        return self.under(geometry, Perturbation.of_all(len(self.q_rad), self.arm.n_joints, added))
+
+    def under(self, geometry: Floats, by: Perturbation) -> ChainAt:
+        """Frames and readings at values of geometry (param,), with what effects add at the samples."""
         frames = perturbed_frames(self.arm, geometry[: len(self.arm.parameters)], self.q_rad, by)
         looks = tuple(look(m, self.unknowns.of_block(i, geometry), frames) for i, m in enumerate(self.measured))
         return ChainAt(by, frames, looks, tuple(map(_read, self.measured, looks, [by] * len(looks))))
@@ -261,7 +255,7 @@ class Chain:
 
     def _added(self, i: int, accepted: Accepted, at: ChainAt, rows: ActiveRows, known: Evaluations) -> list[Floats]:
         """Columns of a term; those that bend with an inner value are computed for every one."""
-        if any(not spec.discrete for spec in accepted.term.inner):
+        if accepted.term.smooth:
             return self._term_columns(accepted, at, rows)
         if i not in known.added:
             known.added[i] = self._term_columns(accepted, at, rows)
@@ -269,20 +263,9 @@ class Chain:
 
     def _term_columns(self, accepted: Accepted, at: ChainAt, rows: ActiveRows) -> list[Floats]:
         """Of each instrument (row, k, coefficients and smooth inner values)."""
-        parts = [accepted.term.basis(self._drivers, accepted.inner)]
-        for j, spec in enumerate(accepted.term.inner):
-            if not spec.discrete:
-                parts.append(self._by_inner(accepted, j, INNER_STEP * (spec.upper - spec.lower))[..., None])
-        basis = np.concatenate(parts, axis=-1)
+        by_inner = accepted.by_inner(lambda inner: replace(accepted, inner=inner).at(self._drivers))
+        basis = np.concatenate([accepted.term.basis(self._drivers, accepted.inner), *by_inner], axis=-1)
         return columns_of(rows.seen, accepted.term.port, basis if rows.few is None else basis[rows.few], at)
-
-    def _by_inner(self, accepted: Accepted, j: int, step: float) -> Floats:
-        low, high = accepted.inner.copy(), accepted.inner.copy()
-        low[j], high[j] = low[j] - step / 2.0, high[j] + step / 2.0
-        amount = accepted.term.amount
-        return (
-            amount(self._drivers, accepted.coefficients, high) - amount(self._drivers, accepted.coefficients, low)
-        ) / step
 
 
 def _read(measured: Measured, seen: Look, by: Perturbation) -> Floats:

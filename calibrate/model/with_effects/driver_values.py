@@ -1,14 +1,9 @@
 """Drivers of a session: what its rows were taken under, and what the model predicts at them."""
 
-from collections.abc import Mapping
-
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.recording import Samples
-from acquisition.recording.rig import Rig
 from calibrate.model.chain import Standing, Used
-from calibrate.model.effects.conditions import conditions_of, uncoupled_samples
 from calibrate.model.effects.drivers import Drivers, Readout
 from calibrate.model.sensors.catalogue import kind_of
 
@@ -16,14 +11,6 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 HARDLY = 1e-2  # of the reach, rad, of the range of readings: an effect may be off by as much until drivers are renewed
-
-
-def drivers_at(
-    rig: Rig, samples: Samples, frames: Floats, readouts: Mapping[str, Readout], temperatures_degC: Mapping[str, Floats]
-) -> Drivers:
-    """Of any table of samples, with what the model predicts at them; temperatures (sample,) by place."""
-    taken = conditions_of(uncoupled_samples(rig.arm, samples), temperatures_degC)
-    return Drivers(**vars(taken), rig=rig, frames=frames, readouts=readouts)
 
 
 def as_before(old: Drivers, new: Drivers) -> bool:

@@ -6,7 +6,9 @@ those that give the measured poses what they had. The measured ones may stand th
 change what is chosen.
 """
 
-from dataclasses import replace
+from collections.abc import Mapping
+from dataclasses import fields, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,27 +48,18 @@ def extended(drivers: Drivers, q_rad: Floats, frames: Floats, like: Ints, copies
 
 def rearranged(drivers: Drivers, order: Ints) -> Drivers:
     """Some of the poses, in this order."""
+    return replace(drivers, **{f.name: _rows(getattr(drivers, f.name), order) for f in fields(drivers)})
 
-    def more(values: Floats | None) -> Floats | None:
-        return None if values is None else values[order]
 
-    return replace(
-        drivers,
-        q_rad=drivers.q_rad[order],
-        frames=drivers.frames[order],
-        t_s=drivers.t_s[order],
-        readouts={name: _more_readout(readout, order) for name, readout in drivers.readouts.items()},
-        approach=more(drivers.approach),
-        last_move_rad=drivers.last_move_rad[order],
-        qd_rad_s=more(drivers.qd_rad_s),
-        cmd_minus_q_rad=more(drivers.cmd_minus_q_rad),
-        temperatures_degC={place: values[order] for place, values in drivers.temperatures_degC.items()},
-        payload_kg=more(drivers.payload_kg),
-        payload_com_m=more(drivers.payload_com_m),
-        psd_sum_v=more(drivers.psd_sum_v),
-        extra={name: values[order] for name, values in drivers.extra.items()},
-        repeat=None if drivers.repeat is None else drivers.repeat[order],
-    )
+def _rows(held: object, order: Ints) -> Any:
+    """Of everything that is held for each pose."""
+    if isinstance(held, np.ndarray):
+        return held[order]
+    if isinstance(held, Mapping):
+        return {name: _rows(one, order) for name, one in held.items()}
+    if isinstance(held, Readout):
+        return replace(held, **{f.name: _rows(getattr(held, f.name), order) for f in fields(held)})
+    return held
 
 
 def carried_over(accepted: Accepted, old: Drivers, new: Drivers) -> Floats | None:
@@ -105,15 +98,3 @@ def _basis(accepted: Accepted, new: Drivers) -> Floats | None:
         return own
     listed: Term | None = next((t for t in terms_of(new) if t.key == accepted.term.key), None)
     return None if listed is None else listed.basis(new, accepted.inner)
-
-
-def _more_readout(readout: Readout, order: Ints) -> Readout:
-    return replace(
-        readout,
-        predicted=readout.predicted[order],
-        seen=readout.seen[order],
-        incidence_rad=None if readout.incidence_rad is None else readout.incidence_rad[order],
-        lean=None if readout.lean is None else readout.lean[order],
-        first_psd=None if readout.first_psd is None else readout.first_psd[order],
-        place=None if readout.place is None else readout.place[order],
-    )

@@ -43,9 +43,7 @@ def flange_twists(frames: Floats, port: Port, basis: Floats) -> Floats:
     """
     match port.place:
         case Place.JOINTS:
-            before = frames[:, :-1]
-            turns = turn_twist(before[..., :3, 2], before[..., :3, 3])  # (pose, joint, 6)
-            return np.swapaxes(turns, 1, 2) @ basis
+            return joint_turns(frames) @ basis
         case Place.FRAME:
             return adjoints(frames[:, port.index]) @ basis
         case Place.SURROUNDINGS:
