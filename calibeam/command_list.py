@@ -35,6 +35,11 @@ GROUPS: dict[str, tuple[ListedCommand, ...]] = {
         ListedCommand("log", "log:log", "Log the encoders, or the tracker, until Ctrl-C."),
     ),
     "Calibrate": (
+        ListedCommand(
+            "calibrate",
+            "calibrate:calibrate_command",
+            "Calibrate the arm from a recording: identify, diagnose, prove, report.",
+        ),
         ListedCommand("design", "design:design_command", "Choose the poses of a session before it is run."),
         ListedCommand("identify", "identify:identify_command", "Identify the arm's geometry from a recording."),
         ListedCommand("diagnose", "diagnose:diagnose_command", "Find the physics that the geometric model leaves out."),

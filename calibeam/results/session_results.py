@@ -3,7 +3,7 @@
 Needs no device any more.
 """
 
-from collections.abc import Generator
+from collections.abc import Generator, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -11,9 +11,15 @@ from acquisition.recording import Recording, read
 from acquisition.recording.output import OutputError
 from calibeam.console import Console
 from calibeam.outcome import PartialResult, interruption
+from calibeam.printing.calibration import calibration_lines
 from calibeam.printing.identification import print_identification
 from calibeam.printing.results import print_diagnosis
-from calibeam.results.identification import identify_session, session_model, write_session_model
+from calibeam.results.identification import (
+    identify_session,
+    refuse_undetermined,
+    session_model,
+    write_session_model,
+)
 from calibrate.diagnose.record.schema import DiagnosisFile
 from calibrate.diagnose.with_model import model_of_diagnosis
 from calibrate.errors import DataError
@@ -27,6 +33,7 @@ from calibrate.report.session_report import session_answers, session_page
 from calibrate.report.workspace import session_arm, session_room
 
 NOW = "now"
+MODEL_NAME, DIAGNOSIS_NAME = "model.json", "diagnosis.json"
 
 
 def write_recording_report(
@@ -79,16 +86,36 @@ def recording_kept(recording_path: Path) -> Generator[None]:
 
 
 def _concluded(recording_path: Path, console: Console) -> Identification:
-    recording, folder = read(recording_path), _folder_of(recording_path)
+    return calibrate(read(recording_path), _folder_of(recording_path), console)
+
+
+def calibrate(recording: Recording, folder: Path, console: Console, *, verbose: bool = False) -> Identification:
+    """Identifies, diagnoses, proves on unseen rows; writes model.json, diagnosis.json, report.html; prints ten lines.
+
+    The model has the physics found where unseen rows are predicted better with it, else the identified geometry alone.
+    `verbose`: all that `identify` and `diagnose` print. DataError where nothing can be identified.
+    """
     result = identify_session(recording)
-    model = write_session_model(result, recording, folder / "model.json")
-    print_identification(console, result, session_evidence(recording, model))
-    console.print(f"model: {folder / 'model.json'}", markup=False)
-    diagnosis = write_session_diagnosis(recording, folder, console)
+    refuse_undetermined(result.status, result.estimates)
+    model = write_session_model(result, recording, folder / MODEL_NAME)
+    if verbose:
+        print_identification(console, result, session_evidence(recording, model), verbose=True)
+    diagnosis, with_physics, kept = write_session_diagnosis(recording, folder)
+    if verbose and diagnosis is not None:
+        print_diagnosis(console, diagnosis, verbose=True)
+    model = model if with_physics is None else with_physics
     answers = write_recording_report(recording, model, folder / "report.html", diagnosis)
-    console.print(f"report: {folder / 'report.html'}", markup=False)
+    for line in (*calibration_lines(answers, diagnosis, kept), *_files(folder, diagnosis)):
+        console.print(line, markup=False, highlight=False)
     console.print(accuracy_of(answers), style="bold", markup=False, highlight=False)
     return result
+
+
+def _files(folder: Path, diagnosis: DiagnosisFile | None) -> Iterator[str]:
+    yield f"model: {folder / MODEL_NAME}"
+    if diagnosis is not None:
+        yield f"diagnosis: {folder / DIAGNOSIS_NAME}"
+    yield f"report: {folder / 'report.html'}"
 
 
 def accuracy_of(answers: Answers) -> str:
@@ -105,23 +132,38 @@ def _folder_of(recording_path: Path) -> Path:
     return recording_path if recording_path.is_dir() else recording_path.parent
 
 
-def write_session_diagnosis(recording: Recording, folder: Path, console: Console) -> DiagnosisFile | None:
-    """Writes diagnosis.json, and model.json with the physics found in place of the identified geometry.
+def write_session_diagnosis(recording: Recording, folder: Path) -> tuple[DiagnosisFile | None, ModelFile | None, str]:
+    """Writes diagnosis.json, and model.json with the physics found in place of the identified geometry; or why not.
 
-    None, with the reason printed, where there is too little to diagnose: model.json then stays as identified.
+    No diagnosis where there is too little for one.
     """
     from calibeam.results.diagnosis import diagnose_to_file  # a report alone starts without it
 
-    path = folder / "diagnosis.json"
     try:
-        found, file = diagnose_to_file(recording, path)
+        found, file = diagnose_to_file(recording, folder / DIAGNOSIS_NAME)
     except DataError as why:
-        console.print(f"no diagnosis: {why}", highlight=False, markup=False)
-        return None
-    print_diagnosis(console, file)
-    console.print(f"diagnosis: {path}", markup=False)
+        return None, None, f"no diagnosis: {why}"
+    if no_better := no_better_with_physics(file):
+        return file, None, no_better
     try:
-        write_model(folder / "model.json", model_of_diagnosis(found, recording))
+        model = model_of_diagnosis(found, recording)
     except DataError as why:
-        console.print(f"model.json holds the identified geometry only: {why}", highlight=False, markup=False)
-    return file
+        return file, None, str(why)
+    write_model(folder / MODEL_NAME, model)
+    return file, model, ""
+
+
+def no_better_with_physics(file: DiagnosisFile) -> str:
+    """Why a model with the physics does not replace one of geometry alone; empty where it does.
+
+    It has to be better on unseen rows for certain, by one way to split at least, and worse for certain by none.
+    """
+    if not file.findings:
+        return "no cause was found beside the geometry"
+    sure = [(one.removed_low, one.removed_high) for one in file.splits]
+    known = [(low, high) for low, high in sure if low is not None and high is not None]
+    if not known:
+        return "there is no proof on unseen rows"
+    if any(high < 0.0 for _, high in known):
+        return "on unseen rows it is worse with the physics"
+    return "" if any(low > 0.0 for low, _ in known) else "on unseen rows it is not better for certain with the physics"

@@ -207,13 +207,17 @@ def session_evidence(recording: Recording, model: ModelFile) -> SessionEvidence:
     """DataError where the model was not made from this recording."""
     weighting = weighting_of(recording, model)
     theta = values_of(weighting, model)
+    # the nominal arm is beside the readings as they are: an effect's constant part stands against the geometry found
+    recorded = weighting.problem(theta, noise_of(weighting, model))
+    before = _places_only(recorded, model, theta)
     if model.effects:
         from calibrate.apply.predicting import without_effects  # all effects: identify finds none, and starts sooner
 
         weighting = without_effects(weighting, theta, recording.samples, model)
-    problem = weighting.problem(theta, noise_of(weighting, model))
-    before = _places_only(weighting, problem, model, theta)
-    readings = tuple(r for i in range(len(weighting.measured)) for r in _readings(weighting, problem, i, before, theta))
+    problem = weighting.problem(theta, noise_of(weighting, model)) if model.effects else recorded
+    readings = tuple(
+        r for i, m in enumerate(weighting.measured) for r in _readings(m, i, (recorded, before), (problem, theta))
+    )
     rms = float(np.sqrt(np.mean(readings[0].error_after ** 2)))
     if abs(rms - model.rms_distance_after_m) > SAME * model.rms_distance_after_m + 1e-12:
         raise DataError(
@@ -225,9 +229,9 @@ def session_evidence(recording: Recording, model: ModelFile) -> SessionEvidence:
     return SessionEvidence(recording, model, readings, problem.parameters, problem, arm, before, theta)
 
 
-def _places_only(weighting: Weighting, problem: JointProblem, model: ModelFile, theta: Floats) -> Floats:
+def _places_only(problem: JointProblem, model: ModelFile, theta: Floats) -> Floats:
     """(param,) the nominal arm, put where the data want it, with nothing free that the fit had held."""
-    arm = {p.name for m in weighting.measured for p in m.problem.chain.model.parameters}
+    arm = {p.name for b in problem.blocks if isinstance(b, Problem) for p in b.chain.model.parameters}
     free = {p.name for p in problem.parameters} if model.covariance is None else set(model.covariance.names)
     parameters = tuple(replace(p, free=p.free and p.name in free - arm) for p in problem.parameters)
     start = np.array([p.start if p.name in arm else v for p, v in zip(parameters, theta.tolist(), strict=True)])
@@ -237,13 +241,17 @@ def _places_only(weighting: Weighting, problem: JointProblem, model: ModelFile, 
 
 
 def _readings(
-    weighting: Weighting, problem: JointProblem, index: int, before: Floats, after: Floats
+    measured: Measured, index: int, before: tuple[JointProblem, Floats], after: tuple[JointProblem, Floats]
 ) -> tuple[Readings, ...]:
-    measured, block = weighting.measured[index], problem.blocks[index]
-    if not isinstance(block, Problem):
-        return ()
-    old, new = (block.misfit(problem.of_block(index, theta)) for theta in (before, after))
-    whitened = problem.residual_of(index, after).reshape(new.shape)
+    """Of one instrument; a problem and its values (param,) each."""
+    misfits: list[Floats] = []
+    for problem, theta in (before, after):
+        block = problem.blocks[index]
+        if not isinstance(block, Problem):
+            return ()
+        misfits.append(block.misfit(problem.of_block(index, theta)))
+    old, new = misfits
+    whitened = after[0].residual_of(index, after[1]).reshape(new.shape)
     rows, every = measured.sample_rows, kind_of(measured.name).quantities
     return tuple(
         Readings(measured.name, q.name, q.unit, rows, old[:, q.part], new[:, q.part], whitened[:, q.part])

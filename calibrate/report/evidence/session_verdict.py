@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import fdtrc
 
-from calibrate.diagnose.record.schema import DiagnosisFile
+from calibrate.diagnose.record.schema import DiagnosisFile, SplitRecord
 from calibrate.fit.accuracy import Alarm, checks_nothing
 from calibrate.fit.solvers import Status
 from calibrate.model.model_file import Fields, ModelFile, UnseenRows
@@ -111,15 +111,19 @@ def session_verdict(evidence: SessionEvidence, diagnosis: DiagnosisFile | None =
         return VerdictBox(Trust.NONE, f"{UNCHECKED} Do not use this model.", reasons, (MORE_POSES, *advice))
     first = next(iter(proofs(model)), None)
     if model.session is None and first is None:  # a diagnosis keeps its proof in diagnosis.json
-        sentence = f"{_how_good(evidence, first)} {UNPROVED} Do not use this model."
+        sentence = f"{_how_good(evidence, first, diagnosis)} {UNPROVED} Do not use this model."
         return VerdictBox(Trust.NONE, sentence, (UNPROVED, *reasons), (TO_PROVE, *advice))
     if first is not None and first.rms_distance_after_m > NO_BETTER * first.rms_distance_before_m:
         keep = "Keep the nominal values; find out what is wrong with arm, instrument or poses, and measure again."
-        return VerdictBox(Trust.NONE, f"{_how_good(evidence, first)} Do not use this model.", reasons, (keep, *advice))
+        return VerdictBox(
+            Trust.NONE, f"{_how_good(evidence, first, diagnosis)} Do not use this model.", reasons, (keep, *advice)
+        )
     if not doubts:
         ready = "Correct poses and programs with it (`calibeam correct`), or export it (`calibeam export-model`)."
-        return VerdictBox(Trust.GOOD, f"{_how_good(evidence, first)} What remains is noise.", (), (ready, *advice))
-    return VerdictBox(Trust.CARE, f"{_how_good(evidence, first)} Use it, with care.", reasons, advice)
+        return VerdictBox(
+            Trust.GOOD, f"{_how_good(evidence, first, diagnosis)} What remains is noise.", (), (ready, *advice)
+        )
+    return VerdictBox(Trust.CARE, f"{_how_good(evidence, first, diagnosis)} Use it, with care.", reasons, advice)
 
 
 def worst_pattern(evidence: SessionEvidence) -> Pattern | None:
@@ -135,9 +139,15 @@ def patterns_of(evidence: SessionEvidence, index: int) -> tuple[Pattern, ...]:
     return patterns(evidence.recording.samples.joints()[rows], rows.astype(np.float64), readings.after)
 
 
-def _how_good(evidence: SessionEvidence, proof: UnseenRows | None) -> str:
+def _how_good(evidence: SessionEvidence, proof: UnseenRows | None, diagnosis: DiagnosisFile | None) -> str:
     readings = evidence.readings[0]
     noun = kind_of(readings.instrument).noun
+    for split in _proved(evidence.model, diagnosis):
+        if split.instrument == readings.instrument and split.rms_after_m is not None and split.rms_before_m is not None:
+            return (
+                f"The calibrated arm misses {noun} that the fit has not seen by {readings.says(split.rms_after_m)} rms "
+                f"of a coordinate; geometry alone misses them by {readings.says(split.rms_before_m)}."
+            )
     if proof is None:
         after, before = (float(np.sqrt(np.mean(e**2))) for e in (readings.error_after, readings.error_before))
         return (
@@ -149,6 +159,11 @@ def _how_good(evidence: SessionEvidence, proof: UnseenRows | None) -> str:
         f"{readings.says(proof.rms_distance_after_m)} rms distance; "
         f"the nominal arm misses them by {readings.says(proof.rms_distance_before_m)}."
     )
+
+
+def _proved(model: ModelFile, diagnosis: DiagnosisFile | None) -> tuple[SplitRecord, ...]:
+    """Of a model with physics: its proof stands in the diagnosis that it is of."""
+    return () if diagnosis is None or model.session is None else diagnosis.splits
 
 
 def _doubts(evidence: SessionEvidence) -> Iterator[Doubt]:

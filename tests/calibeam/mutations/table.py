@@ -35,7 +35,16 @@ SMALL = "--arms 500 --poses 2"  # of an error simulation
 DAILY, ENDURE = 4, int(os.environ.get("SEEDS", "100"))
 SOME = 2  # daily, of a format whose first command is slow on a valid input
 FEW = 1  # daily, where another command has read the format
-SLOW = ("diagnose", "compare", "design", "simulate-errors", "iso9283", "report", "reconcile")  # on a valid input
+SLOW = (
+    "calibrate",
+    "diagnose",
+    "compare",
+    "design",
+    "simulate-errors",
+    "iso9283",
+    "report",
+    "reconcile",
+)  # on a valid input
 
 
 @dataclass(frozen=True)
@@ -97,6 +106,7 @@ def _of_sessions() -> Iterator[Pair]:
         yield Pair(file, f"identify {what} --export urdf --export json")
         yield Pair(file, f"diagnose {what}")
         yield Pair(file, f"report {what}")
+        yield Pair(file, f"calibrate {what} --out made")
         yield Pair(file, f"compare {what} other")
         yield Pair(file, f"export {what} --out made")
         if not file.endswith(".mcap"):
