@@ -13,8 +13,6 @@ from scipy.spatial import KDTree
 
 from acquisition.recording import Samples
 from calibrate.errors import DataError
-from calibrate.model.arms.catalogue import arm_of
-from calibrate.model.arms.serial import SerialArm
 from calibrate.model.effect_records import EffectRecord
 from calibrate.model.effects.catalogue import EFFECTS
 from calibrate.model.effects.conditions import conditions_of, temperatures_of, uncoupled_samples
@@ -87,19 +85,15 @@ def listed(effects: Sequence[EffectRecord], drivers: Drivers) -> tuple[Carried, 
     return tuple(Carried(effect, _accepted(effect, _term(effect, terms, drivers))) for effect in effects)
 
 
-def flange_frames(arm: SerialArm, predictor: Predictor, q_rad: Floats, by: Perturbation) -> Floats:
+def frames_under(predictor: Predictor, q_rad: Floats, by: Perturbation) -> Floats:
     """(row, joint + 1, 4, 4)"""
-    return perturbed_frames(arm, predictor.values_of(arm.parameters), predictor.at_shafts(q_rad), by)
-
-
-def arm_in(predictor: Predictor) -> SerialArm:
-    """The arm whose frames effects act at, behind its encoder discs."""
-    return arm_of(predictor.rig)
+    theta = predictor.values_of(predictor.arm.parameters)
+    return perturbed_frames(predictor.arm, theta, predictor.at_shafts(q_rad), by)
 
 
 def drivers_under(predictor: Predictor, samples: Samples, by: Perturbation) -> Drivers:
     """At all rows, as the model predicts them under a perturbation."""
-    frames = flange_frames(arm_in(predictor), predictor, samples.joints(), by)
+    frames = frames_under(predictor, samples.joints(), by)
     place = {f"temp_{k}_degC": k for k in temperatures_of(samples)}
     as_recorded = {k: samples.column(c) for c, k in place.items()}  # smoothed already
     taken, readouts = conditions_of(uncoupled_samples(predictor.rig.arm, samples), as_recorded), _readouts
