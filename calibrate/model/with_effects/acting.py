@@ -26,7 +26,7 @@ from calibrate.model.predict import Predictor, readings
 from calibrate.model.sensors.catalogue import kind_of
 from calibrate.model.sensors.encoder_difference import NAME as ENCODER_DIFFERENCE
 from calibrate.model.with_effects.driver_values import readout_at
-from calibrate.model.with_effects.new_poses import alike, rearranged
+from calibrate.model.with_effects.new_poses import rearranged, with_meaning
 from calibrate.model.with_effects.ported_chain import perturbed_frames
 
 Floats = NDArray[np.float64]
@@ -34,7 +34,6 @@ Floats = NDArray[np.float64]
 TURNS = 3  # drivers follow the frames that the effects have moved; each turn leaves a thousandth of a change
 SAME = 1e-6  # of a basis: then the exact formula has the same meaning as in the session
 UNIFORM = np.sqrt(3.0)  # half the width of a uniform law over its standard deviation
-CARRIED = 0.05  # of an effect's size: more may not be lost where its columns are chosen again (new_poses.py)
 
 
 @dataclass(frozen=True, eq=False)
@@ -230,14 +229,13 @@ def _basis(carried: Carried, old: Drivers, new: Drivers, inner: Floats | None = 
     size = float(np.linalg.norm(was))
     if np.linalg.norm(now[:n] - was) <= SAME * size:
         return now[n:], _exact(term, new, a.coefficients, values, n)
-    same, level = alike(now[:n], was)
-    left = (was - now[:n] @ same - level) @ a.coefficients
-    if np.linalg.norm(left) > CARRIED * np.linalg.norm(was @ a.coefficients):
+    kept = with_meaning(now, was, a.coefficients)
+    if kept is None:
         raise DataError(
             f"effect {carried.record.name}: these samples lie too far from those it was found in; ask for fewer rows, "
             "or for rows within the recorded range"
         )
-    return now[n:] @ same + level, None
+    return kept, None
 
 
 def _exact(term: Term, new: Drivers, coefficients: Floats, inner: Floats, n: int) -> Floats | None:

@@ -244,7 +244,7 @@ def acting_effects(
     effects: Sequence[EffectRecord], same_session: bool, left_does: str
 ) -> tuple[list[tuple[EffectRecord, bool]], tuple[str, ...]]:
     """Those that act, and whether they have happened before the first row; a sentence for each that does not act. What
-    one left behind acts with the values of that one; `left_does` says so.
+    one left behind acts with the values of that one; `left_does` is the end of its sentence.
     """
     by_name = {effect.name: effect for effect in effects}
     if same_session:
