@@ -9,13 +9,12 @@ from calibeam.simulation.found import FoundEffect, FoundIn
 from calibeam.simulation.mechanism_table import NoMechanismError, at_the_end, mechanism_of
 from calibeam.simulation.rig_in_numbers import light_of
 from calibrate.errors import DataError
-from calibrate.model.effect_records import EffectRecord
 from calibrate.model.effects.ports import Perturbation, Place
 from calibrate.model.model_file import ModelFile
 from calibrate.model.predict import Predictor
 from calibrate.model.sensors.catalogue import kind_of
 from calibrate.model.with_effects.acting import drivers_under, listed
-from calibrate.model.with_effects.applied import recorded_samples
+from calibrate.model.with_effects.applied import acting_effects, recorded_samples
 from simulators.defects.detector import StrainedFace
 from simulators.defects.encoder import RADIUS_M, EccentricDisc
 from simulators.replayed import Sited
@@ -46,7 +45,7 @@ def physics_of(
     """DataError for a name in `without` that the model does not list, or effects that cannot be evaluated."""
     _refuse_unknown(model, without)
     kept = _geometry(predictor)
-    acting, notes = _acting(model, same_recording)
+    acting, notes = acting_effects(model.effects, same_recording, "acts")
     if model.session is None or not acting:
         return Physics(kept, kept, (), {}, notes)
     recorded = recorded_samples(model, n_joints)
@@ -79,22 +78,6 @@ def _refuse_unknown(model: ModelFile, without: Sequence[str]) -> None:
     if wrong is not None:
         known = ", ".join(names) if names else "none"
         raise DataError(f"--without {wrong}: the model has no effect of this name; it has {known}")
-
-
-def _acting(model: ModelFile, same_recording: bool) -> tuple[list[tuple[EffectRecord, bool]], tuple[str, ...]]:
-    """Effects that act, and whether they have happened before the first sample; and what does not act here."""
-    if same_recording:
-        return [(effect, False) for effect in model.effects if not effect.after], ()
-    by_name = {effect.name: effect for effect in model.effects}
-    always = [effect for effect in model.effects if effect.holds == "always"]
-    acting = [(by_name[effect.after], True) if effect.after else (effect, False) for effect in always]
-    left = {effect.after for effect in always if effect.after}
-    return acting, tuple(
-        f"left out, true of its own session only: {effect.name}"
-        + ("; what it left behind at the end acts" if effect.name in left else "")
-        for effect in model.effects
-        if effect.holds != "always"
-    )
 
 
 def _size(found: FoundEffect) -> str:

@@ -35,8 +35,7 @@ from calibrate.model.rigid import cross_matrix, inverse, transform
 from calibrate.model.sensors.catalogue import kind_of
 from calibrate.model.with_effects.acting import (
     Acting,
-    arm_in,
-    flange_frames,
+    frames_under,
     moved_columns,
 )
 from calibrate.model.with_effects.applied import Applied, effects_at
@@ -199,14 +198,14 @@ def _with_sigma(model: ModelFile, predictor: Predictor, samples: Samples, applie
 
 def _flange(predictor: Predictor, applied: Applied, q_rad: Floats) -> Callable[[Predictor, Perturbation], Floats]:
     """(row, 4, 4) of the flange at any perturbation, and at values so near that it moves by the chain's derivative."""
-    arm, at_shafts = arm_in(predictor), predictor.at_shafts(q_rad)
-    theta, frames = predictor.values_of(arm.parameters), flange_frames(arm, predictor, q_rad, applied.by)
+    arm, at_shafts = predictor.arm, predictor.at_shafts(q_rad)
+    theta, frames = predictor.values_of(arm.parameters), frames_under(predictor, q_rad, applied.by)
     twists = twists_by_arm(arm, theta, at_shafts, applied.by, frames)
 
     def at(other: Predictor, by: Perturbation) -> Floats:
         if by is applied.by and np.array_equal(other.at_shafts(q_rad), at_shafts):
             return offsets(twists @ (other.values_of(arm.parameters) - theta)) @ frames[:, -1]
-        return flange_frames(arm, other, q_rad, by)[:, -1]
+        return frames_under(other, q_rad, by)[:, -1]
 
     return at
 
@@ -331,7 +330,7 @@ def without_effects(weighting: Weighting, theta: Floats, samples: Samples, model
     predictor = Predictor.of(model)
     by, q = effects_at(model, predictor, samples, same_session=True, doubts_too=False).by, samples.joints()
     unknowns, nothing = weighting.unweighted.unknowns, Perturbation.none(len(samples), samples.n_joints)
-    chain = Chain(arm_in(predictor), predictor.at_shafts(q), weighting.measured, unknowns)
+    chain = Chain(predictor.arm, predictor.at_shafts(q), weighting.measured, unknowns)
     plain, moved = (chain.under(theta, one).expected for one in (nothing, by))
     return replace(
         weighting,

@@ -18,6 +18,7 @@ from calibrate.errors import DataError
 from calibrate.model.arms.catalogue import arm_of
 from calibrate.model.arms.convert import Conversion, convert, pose_of
 from calibrate.model.arms.eccentric import EccentricArm, with_discs
+from calibrate.model.arms.serial import SerialArm
 from calibrate.model.chain import KinematicModel
 from calibrate.model.dual_psd_rig import dual_psd_of
 from calibrate.model.model_file import ModelFile
@@ -126,8 +127,13 @@ class Predictor:
         return cone_m(self, seat)
 
     @cached_property
+    def arm(self) -> SerialArm:
+        """Whose frames effects act at, behind its encoder discs."""
+        return arm_of(self.rig)
+
+    @cached_property
     def _arm(self) -> KinematicModel:
-        return with_discs(arm_of(self.rig), self.rig)
+        return with_discs(self.arm, self.rig)
 
     @cached_property
     def _target(self) -> Target:

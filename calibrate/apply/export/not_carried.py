@@ -18,7 +18,7 @@ from calibrate.model.effects.ports import Perturbation
 from calibrate.model.model_file import ModelFile
 from calibrate.model.predict import Predictor
 from calibrate.model.sensors.catalogue import kind_of
-from calibrate.model.with_effects.acting import Acting, arm_in, flange_frames
+from calibrate.model.with_effects.acting import Acting, frames_under
 from calibrate.model.with_effects.applied import effects_at, recorded_samples
 from calibrate.quantities import angle, length
 
@@ -103,7 +103,7 @@ def _over(
 
     def shift(found: Sequence[Acting]) -> Floats:
         by = Perturbation.of_all(len(samples), samples.n_joints, (one.added for one in found))
-        moved, plain = (flange_frames(arm_in(predictor), predictor, q, p)[:, -1] for p in (by, nothing))
+        moved, plain = (frames_under(predictor, q, p)[:, -1] for p in (by, nothing))
         return predictor.tip_at(moved) - predictor.tip_at(plain)
 
     found = [a for a in applied.found if a.carried.record.name not in carried]

@@ -13,8 +13,6 @@ from scipy.spatial import KDTree
 
 from acquisition.recording import Samples
 from calibrate.errors import DataError
-from calibrate.model.arms.catalogue import arm_of
-from calibrate.model.arms.serial import SerialArm
 from calibrate.model.effect_records import EffectRecord
 from calibrate.model.effects.catalogue import EFFECTS
 from calibrate.model.effects.conditions import conditions_of, temperatures_of, uncoupled_samples
@@ -28,7 +26,7 @@ from calibrate.model.predict import Predictor, readings
 from calibrate.model.sensors.catalogue import kind_of
 from calibrate.model.sensors.encoder_difference import NAME as ENCODER_DIFFERENCE
 from calibrate.model.with_effects.driver_values import readout_at
-from calibrate.model.with_effects.new_poses import alike, rearranged
+from calibrate.model.with_effects.new_poses import rearranged, with_meaning
 from calibrate.model.with_effects.ported_chain import perturbed_frames
 
 Floats = NDArray[np.float64]
@@ -36,7 +34,6 @@ Floats = NDArray[np.float64]
 TURNS = 3  # drivers follow the frames that the effects have moved; each turn leaves a thousandth of a change
 SAME = 1e-6  # of a basis: then the exact formula has the same meaning as in the session
 UNIFORM = np.sqrt(3.0)  # half the width of a uniform law over its standard deviation
-CARRIED = 0.05  # of an effect's size: more may not be lost where its columns are chosen again (new_poses.py)
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,19 +84,15 @@ def listed(effects: Sequence[EffectRecord], drivers: Drivers) -> tuple[Carried, 
     return tuple(Carried(effect, _accepted(effect, _term(effect, terms, drivers))) for effect in effects)
 
 
-def flange_frames(arm: SerialArm, predictor: Predictor, q_rad: Floats, by: Perturbation) -> Floats:
+def frames_under(predictor: Predictor, q_rad: Floats, by: Perturbation) -> Floats:
     """(row, joint + 1, 4, 4)"""
-    return perturbed_frames(arm, predictor.values_of(arm.parameters), predictor.at_shafts(q_rad), by)
-
-
-def arm_in(predictor: Predictor) -> SerialArm:
-    """The arm whose frames effects act at, behind its encoder discs."""
-    return arm_of(predictor.rig)
+    theta = predictor.values_of(predictor.arm.parameters)
+    return perturbed_frames(predictor.arm, theta, predictor.at_shafts(q_rad), by)
 
 
 def drivers_under(predictor: Predictor, samples: Samples, by: Perturbation) -> Drivers:
     """At all rows, as the model predicts them under a perturbation."""
-    frames = flange_frames(arm_in(predictor), predictor, samples.joints(), by)
+    frames = frames_under(predictor, samples.joints(), by)
     place = {f"temp_{k}_degC": k for k in temperatures_of(samples)}
     as_recorded = {k: samples.column(c) for c, k in place.items()}  # smoothed already
     taken, readouts = conditions_of(uncoupled_samples(predictor.rig.arm, samples), as_recorded), _readouts
@@ -236,14 +229,13 @@ def _basis(carried: Carried, old: Drivers, new: Drivers, inner: Floats | None = 
     size = float(np.linalg.norm(was))
     if np.linalg.norm(now[:n] - was) <= SAME * size:
         return now[n:], _exact(term, new, a.coefficients, values, n)
-    same, level = alike(now[:n], was)
-    left = (was - now[:n] @ same - level) @ a.coefficients
-    if np.linalg.norm(left) > CARRIED * np.linalg.norm(was @ a.coefficients):
+    kept = with_meaning(now, was, a.coefficients)
+    if kept is None:
         raise DataError(
             f"effect {carried.record.name}: these samples lie too far from those it was found in; ask for fewer rows, "
             "or for rows within the recorded range"
         )
-    return now[n:] @ same + level, None
+    return kept, None
 
 
 def _exact(term: Term, new: Drivers, coefficients: Floats, inner: Floats, n: int) -> Floats | None:

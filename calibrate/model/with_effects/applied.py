@@ -192,7 +192,8 @@ def effects_at(
 
     DataError for rows at which an effect of the model cannot be evaluated.
     """
-    used, notes = _used(model.effects, same_session)
+    acting_here, notes = acting_effects(model.effects, same_session, "is applied")
+    used = [effect for effect, _ in acting_here]
     nothing = Perturbation.none(len(samples), samples.n_joints)
     if model.session is None or not used:
         return Applied(nothing, (), (), ("",) * len(samples), notes)
@@ -239,16 +240,20 @@ def recorded_samples(model: ModelFile, n_joints: int) -> Samples:
     return Samples(table, n_joints)
 
 
-def _used(effects: Sequence[EffectRecord], same_session: bool) -> tuple[list[EffectRecord], tuple[str, ...]]:
-    """Those that act, and a sentence for each that does not. An aftermath acts with the values of what left it."""
+def acting_effects(
+    effects: Sequence[EffectRecord], same_session: bool, left_does: str
+) -> tuple[list[tuple[EffectRecord, bool]], tuple[str, ...]]:
+    """Those that act, and whether they have happened before the first row; a sentence for each that does not act. What
+    one left behind acts with the values of that one; `left_does` is the end of its sentence.
+    """
     by_name = {effect.name: effect for effect in effects}
     if same_session:
-        return [e for e in effects if not e.after], ()
+        return [(e, False) for e in effects if not e.after], ()
     left = {e.after for e in effects}
-    used = [by_name[e.after] if e.after else e for e in effects if e.holds == "always"]
-    return used, tuple(
+    here = [(by_name[e.after], True) if e.after else (e, False) for e in effects if e.holds == "always"]
+    return here, tuple(
         f"left out, true of its own session only: {e.name}"
-        + ("; what it left behind at the end is applied" if e.name in left else "")
+        + (f"; what it left behind at the end {left_does}" if e.name in left else "")
         for e in effects
         if e.holds != "always"
     )
@@ -352,7 +357,7 @@ def _of_centres(
 def _at_the_end(filled: Completed, last_t_s: float) -> Completed:
     """What follows the clock is left out elsewhere, but for what stays as it was at the end of the session."""
     columns = {**filled.samples.columns, "t_s": np.full(len(filled.samples), last_t_s)}
-    return Completed(Samples(columns, filled.samples.n_joints), filled.missing)
+    return replace(filled, samples=Samples(columns, filled.samples.n_joints))
 
 
 def _of_missing(

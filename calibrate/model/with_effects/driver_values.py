@@ -1,5 +1,7 @@
 """Drivers of a session: what its rows were taken under, and what the model predicts at them."""
 
+from typing import TypeVar
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -8,7 +10,7 @@ from calibrate.model.effects.drivers import Drivers, Readout
 from calibrate.model.sensors.catalogue import kind_of
 
 Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+Number = TypeVar("Number", np.float64, np.int64)
 
 HARDLY = 1e-2  # of the reach, rad, of the range of readings: an effect may be off by as much until drivers are renewed
 
@@ -47,23 +49,18 @@ def readout_at(
         kind_of(name),
         predicted,
         seen,
-        None if stood.incidence_rad is None else _among(n, rows, stood.incidence_rad, np.nan),
-        None if stood.lean is None else _among(n, rows, stood.lean, 0.0),
-        None if stood.first_psd is None else _numbers(n, rows, stood.first_psd),
-        None if stood.place is None else _numbers(n, rows, stood.place),
+        _among(n, rows, stood.incidence_rad, np.nan),
+        _among(n, rows, stood.lean, 0),
+        _among(n, rows, stood.first_psd, 0),
+        _among(n, rows, stood.place, 0),
         joints=() if sensor is None else sensor.joints_compared(),
     )
 
 
-def _among(n: int, rows: NDArray[np.intp], values: Floats, else_: float) -> Floats:
+def _among(n: int, rows: NDArray[np.intp], values: NDArray[Number] | None, else_: float) -> NDArray[Number] | None:
     """(sample, ...) of values at some rows."""
-    out = np.full((n, *values.shape[1:]), else_)
-    out[rows] = values
-    return out
-
-
-def _numbers(n: int, rows: NDArray[np.intp], values: Ints) -> Ints:
-    """(sample,) zero elsewhere."""
-    out = np.zeros(n, dtype=np.int64)
+    if values is None:
+        return None
+    out = np.full((n, *values.shape[1:]), else_, dtype=values.dtype)
     out[rows] = values
     return out

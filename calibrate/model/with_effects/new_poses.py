@@ -68,11 +68,16 @@ def carried_over(accepted: Accepted, old: Drivers, new: Drivers) -> Floats | Non
     None: it would have to give the measured poses something else than they had.
     """
     was, now = accepted.term.basis(old, accepted.inner), _basis(accepted, new)
-    if now is None:
-        return None
+    return None if now is None else with_meaning(now, was, accepted.coefficients)
+
+
+def with_meaning(now: Floats, was: Floats, coefficients: Floats) -> Floats | None:
+    """(new pose, width, coefficient) of a basis (pose, width, m) at the measured and the new poses, as the coefficients
+    mean it that were found with `was` at the measured ones. None as above.
+    """
     n = len(was)
     same, level = alike(now[:n], was)
-    size, left = was @ accepted.coefficients, (was - now[:n] @ same - level) @ accepted.coefficients
+    size, left = was @ coefficients, (was - now[:n] @ same - level) @ coefficients
     return now[n:] @ same + level if np.linalg.norm(left) <= NEARLY * np.linalg.norm(size) else None
 
 

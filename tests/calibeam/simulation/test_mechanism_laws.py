@@ -26,7 +26,7 @@ from calibrate.model.predict import Predictor, readings
 from calibrate.model.sensors.camera import PLACE, TURN
 from calibrate.model.sensors.catalogue import kind_of
 from calibrate.model.sensors.encoder_difference import NAME as ENCODER_DIFFERENCE
-from calibrate.model.with_effects.acting import arm_in, moved_columns
+from calibrate.model.with_effects.acting import moved_columns
 from calibrate.model.with_effects.ported_chain import perturbed_frames
 from simulators.conceal.case import conceal
 from simulators.conceal.rig_file import rig_document, toml_text
@@ -66,7 +66,7 @@ class Bench:
 
     def modelled(self, q_rad: np.ndarray, by: Perturbation) -> np.ndarray:
         """(row, k)"""
-        frames = perturbed_frames(arm_in(self.predictor), self.theta, q_rad, by)
+        frames = perturbed_frames(self.predictor.arm, self.theta, q_rad, by)
         if self.rig.seat_m is not None:
             return self.predictor.tip_at(frames[:, -1])
         read = readings(self.predictor, frames[:, -1], self.samples, self.predictor.instruments)
@@ -75,7 +75,7 @@ class Bench:
 
     @property
     def theta(self) -> np.ndarray:
-        return self.predictor.values_of(arm_in(self.predictor).parameters)
+        return self.predictor.values_of(self.predictor.arm.parameters)
 
     def observed(self, read: Readings) -> np.ndarray:
         """(row, k) in the order of `modelled`."""

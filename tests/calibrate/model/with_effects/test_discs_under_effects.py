@@ -9,7 +9,7 @@ from acquisition.recording import Samples
 from calibrate.apply.predicting import flange_with_physics
 from calibrate.model.effects.ports import Perturbation
 from calibrate.model.predict import Predictor
-from calibrate.model.with_effects.acting import arm_in, flange_frames
+from calibrate.model.with_effects.acting import frames_under
 from tests.calibrate.model.with_effects.two_joints import RIG, two_joints
 
 DISC_RAD = 2e-3
@@ -32,7 +32,7 @@ def with_disc():
 
 def test_frames_without_effects_are_those_of_the_geometry():
     predictor, nothing = with_disc(), Perturbation.none(len(Q_RAD), 2)
-    frames = flange_frames(arm_in(predictor), predictor, Q_RAD, nothing)
+    frames = frames_under(predictor, Q_RAD, nothing)
     assert np.allclose(frames[:, -1], predictor.flange(Q_RAD), atol=1e-12)
     drawn = replace(predictor, values={})
     assert np.max(np.abs(frames[:, -1] - drawn.flange(Q_RAD))) > 1e-4
