@@ -1,4 +1,6 @@
-"""A diagnosis in a terminal: verdict, causes with their size, proof, uncertainty, what to do next."""
+"""A diagnosis in a terminal: verdict, causes with their size, proof, uncertainty, what to do next; and the end of a
+calibration in ten lines.
+"""
 
 from collections.abc import Iterator
 
@@ -21,6 +23,7 @@ from calibrate.report.diagnosis import (
     stream_words,
     verdict_words,
 )
+from calibrate.report.elements.verdict import Answers
 
 MOST = 8  # of what is of less weight; all of it stands in the file
 
@@ -65,6 +68,21 @@ def _brief(file: DiagnosisFile) -> Iterator[str]:
     yield from _few([f"not completed: {one.stage}: {one.reason}" for one in file.incomplete])
     yield from _few(missing_lines(file))
     yield from _few([f"next: {line}" for line in file.next])
+
+
+def calibration_lines(answers: Answers, diagnosis: DiagnosisFile | None, kept: str) -> Iterator[str]:
+    """`kept`: why the model is the geometry alone; empty where it holds the physics found."""
+    judged = answers.verdict
+    yield judged.sentence
+    yield f"trust: {judged.trust.value}"
+    yield from (f"  {reason}" for reason in judged.reasons[:FEW])
+    found = () if diagnosis is None else diagnosis.findings
+    for number, one in enumerate(found[:CAUSES], start=1):
+        yield f"{number}. {one.says} (confidence {one.confidence:.2f})"
+    if len(found) > CAUSES:
+        yield f"and {len(found) - CAUSES} more causes: in the report"
+    yield f"the model is the geometry alone: {kept}" if kept else "the model holds the physics found"
+    yield from (f"to do: {advice}" for advice in judged.advice[:1])
 
 
 def _few(lines: list[str]) -> Iterator[str]:

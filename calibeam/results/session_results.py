@@ -11,9 +11,8 @@ from acquisition.recording import Recording, read
 from acquisition.recording.output import OutputError
 from calibeam.console import Console
 from calibeam.outcome import PartialResult, interruption
-from calibeam.printing.calibration import calibration_lines
 from calibeam.printing.identification import print_identification
-from calibeam.printing.results import print_diagnosis
+from calibeam.printing.results import calibration_lines, print_diagnosis
 from calibeam.results.identification import (
     identify_session,
     refuse_undetermined,
