@@ -134,7 +134,7 @@ def _of_few(
 ) -> Reconciled:
     """What all rows show without a diagnosis: how far apart the two are, and whether noise alone may do it."""
     beyond = [one for one in found if one.stated_m is not None and one.low_m > AGREES * one.stated_m]
-    poses, needed = int(poses_of(measured.samples).max()) + 1, round(limits.FEWEST_SAMPLES / (1.0 - UNSEEN))
+    poses, needed = int(poses_of(measured.samples).max()) + 1, round(limits.FEWEST_FOR_NAMES / (1.0 - UNSEEN))
     rows = f"{counted(len(measured.samples), 'row')} in {counted(poses, 'pose')}"
     open_ = f"{rows}: what the simulation lacks cannot be decided; about {needed} poses are needed"
     far = "; ".join(

@@ -127,7 +127,7 @@ def split(samples: Samples, seed: int) -> tuple[Ints, Ints]:
 
 
 def enough(seen: Ints, unseen: Ints) -> bool:
-    return len(seen) >= limits.FEWEST_SAMPLES and len(unseen) >= FEWEST_UNSEEN
+    return len(seen) >= limits.FEWEST_FOR_NAMES and len(unseen) >= FEWEST_UNSEEN
 
 
 def poses_of(samples: Samples) -> Ints:
