@@ -12,8 +12,10 @@ inputs.
 
 import math
 import re
+import tomllib
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from simulators.ur.readout import Readout
@@ -29,9 +31,6 @@ class Field:
     type_name: str
     read: Source
     constant: float | tuple[float, ...] | None = None  # where the value is always the same
-
-
-ZERO6 = (0.0,) * 6
 
 
 LIVE: dict[str, Field] = {
@@ -84,47 +83,12 @@ LIVE: dict[str, Field] = {
     "input_bit_registers32_to_63": Field("UINT32", lambda r: r.memory.inputs.word(32)),
 }
 
+TABLES: dict[str, dict[str, Any]] = tomllib.loads(Path(__file__).with_name("fields.toml").read_text(encoding="utf-8"))
 CONSTANT: dict[str, tuple[str, float | tuple[float, ...]]] = {
-    "actual_execution_time": ("DOUBLE", 0.0002),
-    "target_execution_time": ("DOUBLE", 0.002),
-    "actual_momentum": ("DOUBLE", 0.0),
-    "actual_main_voltage": ("DOUBLE", 48.0),
-    "actual_robot_voltage": ("DOUBLE", 48.0),
-    "actual_robot_current": ("DOUBLE", 0.6),
-    "actual_joint_voltage": ("VECTOR6D", (48.0,) * 6),
-    "actual_current_window": ("VECTOR6D", (1.0,) * 6),
-    "wrench_calc_from_currents": ("VECTOR6D", ZERO6),
-    "actual_TCP_acceleration": ("VECTOR6D", ZERO6),
-    "target_TCP_acceleration": ("VECTOR6D", ZERO6),
-    "target_base_acceleration": ("VECTOR6D", ZERO6),
-    "target_base_wrench": ("VECTOR6D", ZERO6),
-    "actual_digital_input_bits": ("UINT64", 0),
-    "actual_configurable_digital_input_bits": ("UINT64", 0),
-    "io_current": ("DOUBLE", 0.02),
-    "standard_analog_input0": ("DOUBLE", 0.0),
-    "standard_analog_input1": ("DOUBLE", 0.0),
-    "tool_mode": ("UINT32", 253),
-    "tool_analog_input_types": ("UINT32", 3),
-    "tool_analog_input0": ("DOUBLE", 0.0),
-    "tool_analog_input1": ("DOUBLE", 0.0),
-    "tool_output_current": ("DOUBLE", 0.0),
-    "tool_temperature": ("DOUBLE", 30.0),
-    "tool_output_mode": ("UINT8", 0),
-    "tool_digital_output0_mode": ("UINT8", 0),
-    "tool_digital_output1_mode": ("UINT8", 0),
-    "joint_position_deviation_ratio": ("DOUBLE", 0.0),
-    "collision_detection_ratio": ("DOUBLE", 0.0),
-    "time_scale_source": ("INT32", 0),
-    "script_control_line": ("UINT32", 0),
-    "encoder0_raw": ("INT32", 0),
-    "encoder1_raw": ("INT32", 0),
-    "euromap67_input_bits": ("UINT32", 0),
-    "euromap67_output_bits": ("UINT32", 0),
-    "euromap67_24V_voltage": ("DOUBLE", 0.0),
-    "euromap67_24V_current": ("DOUBLE", 0.0),
-    "actual_robot_energy_consumed": ("DOUBLE", 0.0),
-    "actual_robot_braking_energy_dissipated": ("DOUBLE", 0.0),
+    name: (type_name, tuple(value) if isinstance(value, list) else value)
+    for name, (type_name, value) in TABLES["constant"].items()
 }
+SETTINGS: dict[str, str] = TABLES["settings"]
 
 REGISTER = re.compile(r"(input|output)_(int|double|bit)_register_(\d+)")
 
@@ -155,21 +119,6 @@ def _output_register(is_input: bool, kind: str, index: int) -> Field | None:
 
 # --- inputs
 
-SETTINGS = {
-    "speed_slider_mask": "UINT32",
-    "speed_slider_fraction": "DOUBLE",
-    "standard_digital_output_mask": "UINT8",
-    "standard_digital_output": "UINT8",
-    "configurable_digital_output_mask": "UINT8",
-    "configurable_digital_output": "UINT8",
-    "tool_digital_output_mask": "UINT8",
-    "tool_digital_output": "UINT8",
-    "standard_analog_output_mask": "UINT8",
-    "standard_analog_output_type": "UINT8",
-    "standard_analog_output_0": "DOUBLE",
-    "standard_analog_output_1": "DOUBLE",
-    "external_force_torque": "VECTOR6D",
-}
 INPUT_REGISTER = re.compile(r"input_(int|double|bit)_register_(\d+)")
 
 
