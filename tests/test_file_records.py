@@ -26,7 +26,7 @@ ROOT = Path(__file__).parents[1]
 RECORDS = (Rig, PosePlan, FitPlan, ErrorPlan, TaskEntries, ModelFile, DiagnosisFile, Row, StreamsAbout, PartFile)
 PRIVATE = (camera._File, read._ChannelRow)  # pyright: ignore[reportPrivateUsage] - records of one reader
 # Read by the program that wrote them, in one run or in a sealed folder; nobody edits them.
-OWN = {"Truth": "prove", "ProofFile": "prove", "Task": "fleet", "ReconcileFile": "prove"}
+OWN = {"Truth": "prove", "Begun": "prove", "ProofFile": "prove", "Task": "fleet", "ReconcileFile": "prove"}
 OUR_READERS = {"checked", "read_json"}
 READERS = {"decode", "convert", *OUR_READERS}
 UPPER, LOWER = ("le", "lt"), ("ge", "gt")

@@ -46,6 +46,7 @@ def prove_command(
     jobs: int = 2,
     without: Annotated[tuple[str, ...], Parameter(show_default=False)] = (),
     wire: int = 0,
+    resume: Annotated[bool, Parameter(negative=())] = False,
     loop: Annotated[bool, Parameter(negative=())] = False,
     publish: bool = False,
     json: bool = False,
@@ -84,6 +85,8 @@ def prove_command(
         Physics to take out of the catalogue: then its cases have to be called unknown, at the right place.
     wire
         Further cases whose recordings come over emulated wires: a minute each, two cores.
+    resume
+        Go on with the proof in --out that an interruption has ended; with the same options otherwise.
     loop
         Reconcile each case with the simulation of its rig file instead: how far off it is on unseen rows, before, after
         geometry and after physics. Takes --cases, --wire, --seed, --jobs and --out, and no other option.
@@ -110,7 +113,7 @@ def prove_command(
     if cases < 1 or jobs < 1 or wire < 0:
         raise DataError(f"--cases {cases} --jobs {jobs} --wire {wire}: give 1 or more cases and jobs, wire 0 or more")
     plan = Plan(mix, seed, cases, jobs, without, wire)
-    proof = prove(out, plan, lambda word: _tell(console, word), " ".join(["calibeam", *sys.argv[1:]]))
+    proof = prove(out, plan, lambda word: _tell(console, word), " ".join(["calibeam", *sys.argv[1:]]), resume=resume)
     _print_proof(console, proof)
     console.print(f"proof: {out / 'proof.json'}\npage: {out / 'proof.html'}", markup=False, highlight=False)
     if json:

@@ -6,7 +6,7 @@ hidden over their standard input, never through a file; the recording holds the 
 """
 
 import json
-from collections.abc import Generator, Mapping
+from collections.abc import Generator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -178,20 +178,24 @@ class _Order:
     wired: bool = False
 
 
-def conceal_cases(layout: Layout, mix: Mix, seed: int, cases: int, jobs: int, wired: int = 0) -> Generator[Concealed]:
-    """The wired cases first, one at a time, for emulators and readers take two cores; then all others in their order.
+def conceal_cases(
+    layout: Layout, mix: Mix, seed: int, cases: int, jobs: int, numbers: Sequence[int]
+) -> Generator[Concealed]:
+    """These of the cases; from number `cases` on they are recorded over wires.
+
+    Those come first, one at a time, for emulators and readers take two cores; then all others in their order.
 
     ConcealError where one cannot be drawn at all, or a machine is too busy for a session on the wires.
     """
-    orders = [_Order(layout, mix, seed, number, new_key(), number >= cases) for number in range(cases + wired)]
-    for few, at_a_time in ((orders[cases:], 1), (orders[:cases], jobs)):
+    orders = [_Order(layout, mix, seed, number, new_key(), number >= cases) for number in numbers]
+    for few, at_a_time in (([o for o in orders if o.wired], 1), ([o for o in orders if not o.wired], jobs)):
         if few:
             yield from in_workers(_conceal, few, at_a_time)
 
 
-def publish(layout: Layout, cases: list[Concealed]) -> str:
-    """Writes all hashes to a file; returns the hash of that file, which stands for them all."""
-    text = "".join(f"{one.sha256}  {one.scenario.name}\n" for one in cases)
+def publish(layout: Layout, cases: Sequence[Concealed], before: str = "") -> str:
+    """Writes all hashes to a file, after those from `before`; returns the hash of that file, which stands for all."""
+    text = before + "".join(f"{one.sha256}  {one.scenario.name}\n" for one in cases)
     layout.hashes.write_text(text, encoding="utf-8")
     return fingerprint(text.encode())
 

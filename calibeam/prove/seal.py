@@ -8,6 +8,7 @@ The layout of a proof keeps recordings and answers on one side, seals on the oth
 
 import hashlib
 import secrets
+import shutil
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -64,6 +65,16 @@ class Layout:
     def hashes(self) -> Path:
         """Published before anything is diagnosed."""
         return self.out / "hashes.txt"
+
+    @property
+    def slices(self) -> Path:
+        """What is finished, slice by slice."""
+        return self.out / "slices.json"
+
+    def clear(self, name: str) -> None:
+        """Nothing of a case is left."""
+        for folder in (self.recorded(name).parent, self.simulation(name), self.answer(name)):
+            shutil.rmtree(folder, ignore_errors=True)
 
     @property
     def proof(self) -> Path:

@@ -1,8 +1,10 @@
 """The small proof of every change: conceal, diagnose in another process, reveal, score; and what is refused."""
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from importlib import import_module
 from pathlib import Path
+from typing import Any
 
 import msgspec
 import pytest
@@ -10,9 +12,11 @@ from mcap.stream_reader import StreamReader
 
 from calibeam import cli
 from calibeam.commands import prove as command
+from calibeam.prove.diagnosing import Answered
 from calibeam.prove.prove import Plan
 from calibeam.prove.record import ProofFile
 from calibeam.prove.scenario import DEVELOPMENT
+from calibeam.prove.seal import Layout, fingerprint
 from calibrate.errors import DataError
 
 PLAIN = ("--family", "tracker", "--enr", "3", "4", "--jobs", "1", "--seed", "21")
@@ -46,6 +50,42 @@ def test_a_plain_effect_is_found_named_and_better_where_nobody_measured(tmp_path
     truth = json.loads((tmp_path / "p" / "revealed" / f"{case.name}.json").read_bytes())
     assert truth["defects"][0]["mechanism"] == "encoder-eccentricity"
     assert "as expected" in (tmp_path / "p" / "proof.html").read_text(encoding="utf-8")
+
+
+@pytest.mark.usefixtures("bare_figures")
+@pytest.mark.timeout(300)
+def test_an_interrupted_proof_goes_on_after_its_last_whole_slice(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    options = ("--kind", "one", "--mechanism", "encoder-eccentricity", "--cases", "2", "--out", str(tmp_path / "p"))
+    proving = import_module("calibeam.prove.prove")
+    diagnose, asked = proving.diagnose_cases, list[str]()
+
+    def interrupted(layout: Layout, names: Sequence[str], *rest: Any) -> Iterator[Answered]:
+        asked.extend(names)
+        if asked == ["case-0000", "case-0001"]:
+            raise KeyboardInterrupt
+        yield from diagnose(layout, names, *rest)
+
+    monkeypatch.setattr(proving, "SLICE", 1)
+    monkeypatch.setattr(proving, "diagnose_cases", interrupted)
+    assert cli.run(["prove", *PLAIN, *options]) == 3
+    assert not (tmp_path / "p" / "proof.json").exists()
+    assert (
+        cli.run(["prove", *PLAIN, *options, "--without", "backlash", "--resume"]) == 1
+    )  # not the proof that was begun
+    assert cli.run(["prove", *PLAIN, *options, "--resume"]) == 0
+    assert asked == ["case-0000", "case-0001", "case-0001"]
+    proof = msgspec.json.decode((tmp_path / "p" / "proof.json").read_bytes(), type=ProofFile)
+    hashes = (tmp_path / "p" / "hashes.txt").read_bytes()
+    assert [f"{c.sha256}  {c.name}" for c in proof.cases] == hashes.decode().splitlines()
+    assert proof.published == fingerprint(hashes)
+    assert all(case.defects[0].named for case in proof.cases)
+
+
+def test_nothing_is_resumed_where_nothing_was_begun(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.run(["prove", "--out", str(tmp_path), "--cases", "1", "--resume"]) == 1
+    assert "slices.json" in "".join(capsys.readouterr().err.split())
 
 
 @pytest.mark.endure  # as `make mutate` does with ten effects
@@ -98,7 +138,7 @@ def test_a_choice_of_cases_is_not_published(tmp_path: Path, capsys: pytest.Captu
 def test_nobody_looks_at_the_published_cases_by_chance(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     planned: list[Plan] = []
 
-    def stop(out: Path, plan: Plan, *_: object) -> ProofFile:
+    def stop(out: Path, plan: Plan, *_: object, **__: object) -> ProofFile:
         planned.append(plan)
         raise DataError("enough seen")
 
