@@ -11,11 +11,12 @@ from calibeam.console import Console
 from calibeam.overwriting import writes
 from calibeam.printing.progress import stages_shown
 from calibeam.printing.results import print_diagnosis, print_streams
-from calibeam.results.diagnosis import diagnose_recording, diagnose_streams, plan_next, refuse_wrong_file
+from calibeam.results.diagnosis import diagnose_recording, diagnose_streams, plan_next, refuse_wrong_file, why_kept
 from calibeam.results.identification import naming_source
 from calibrate.diagnose.record.file import DIAGNOSIS, write_diagnosis
+from calibrate.diagnose.record.schema import DiagnosisFile
 from calibrate.diagnose.with_model import model_of_diagnosis
-from calibrate.model.model_file import MODEL, read_model, write_model
+from calibrate.model.model_file import MODEL, ModelFile, read_model, write_model
 from calibrate.report.diagnosis import write_diagnosis_report
 from calibrate.report.elements.html import page_output
 
@@ -54,7 +55,8 @@ def diagnose_command(
     out
         Where to write the diagnosis.
     model_out
-        Where to write the model: geometry fitted together with the physics found, which `calibeam predict` uses.
+        Where to write the model: geometry fitted together with the physics found, which `calibeam predict` uses. A
+        model of the same readings that stands there is kept where the new one is not better on unseen rows.
     report
         Where to write the pages for a person; default: beside the diagnosis.
     plan_out
@@ -79,15 +81,21 @@ def diagnose_command(
         else:
             print_diagnosis(console, file, verbose=verbose)
         refuse_wrong_file(found, out)
-        if model_out is not None:
-            write_model(model_out, model_of_diagnosis(found, source))
+        modelled = "" if model_out is None else _write_model(model_out, model_of_diagnosis(found, source), file)
         planned = "" if plan_out is None else plan_next(found, plan_out)
     told = msgspec.structs.replace(file, next=(*file.next, planned)) if planned else file
     page = write_diagnosis_report(out.with_suffix(".html") if report is None else report, source, told)
-    modelled = "" if model_out is None else f"model: {model_out}"
     if not json:
         for line in filter(None, (planned, f"diagnosis: {out}", modelled, f"report: {page}")):
             console.print(line, markup=False, highlight=False)
+
+
+def _write_model(path: Path, model: ModelFile, file: DiagnosisFile) -> str:
+    """A line about it."""
+    if kept := why_kept(path, model, file):
+        return f"model: {path} is kept as it is: {kept}"
+    write_model(path, model)
+    return f"model: {path}"
 
 
 def _streams_only(console: Console, source: Recording, out: Path, *, json: bool) -> None:

@@ -136,7 +136,7 @@ def write_session_diagnosis(recording: Recording, folder: Path) -> tuple[Diagnos
 
     No diagnosis where there is too little for one.
     """
-    from calibeam.results.diagnosis import diagnose_to_file  # a report alone starts without it
+    from calibeam.results.diagnosis import diagnose_to_file, no_better_with_physics  # a report starts without it
 
     try:
         found, file = diagnose_to_file(recording, folder / DIAGNOSIS_NAME)
@@ -150,19 +150,3 @@ def write_session_diagnosis(recording: Recording, folder: Path) -> tuple[Diagnos
         return file, None, str(why)
     write_model(folder / MODEL_NAME, model)
     return file, model, ""
-
-
-def no_better_with_physics(file: DiagnosisFile) -> str:
-    """Why a model with the physics does not replace one of geometry alone; empty where it does.
-
-    It has to be better on unseen rows for certain, by one way to split at least, and worse for certain by none.
-    """
-    if not file.findings:
-        return "no cause was found beside the geometry"
-    sure = [(one.removed_low, one.removed_high) for one in file.splits]
-    known = [(low, high) for low, high in sure if low is not None and high is not None]
-    if not known:
-        return "there is no proof on unseen rows"
-    if any(high < 0.0 for _, high in known):
-        return "on unseen rows it is worse with the physics"
-    return "" if any(low > 0.0 for low, _ in known) else "on unseen rows it is not better for certain with the physics"

@@ -6,8 +6,9 @@ import msgspec
 import pytest
 
 from calibeam.cli import run
-from calibeam.results.session_results import no_better_with_physics
+from calibeam.results.diagnosis import no_better_with_physics, why_kept
 from calibrate.diagnose.record.file import read_diagnosis
+from calibrate.model.model_file import read_model
 from simulators.conceal.case import conceal
 from simulators.conceal.case_files import write_case
 from simulators.conceal.wanted import Wanted
@@ -75,3 +76,13 @@ def test_physics_replaces_geometry_where_unseen_rows_are_better_for_certain_and_
 def test_geometry_stays_where_no_cause_was_found(out):
     file = read_diagnosis(out / "diagnosis.json")
     assert no_better_with_physics(msgspec.structs.replace(file, findings=()))
+
+
+def test_a_model_of_the_same_readings_is_kept_where_the_new_one_is_no_better(out, tmp_path):
+    file, model = read_diagnosis(out / "diagnosis.json"), read_model(out / "model.json")
+    nothing_found = msgspec.structs.replace(file, findings=())
+    assert why_kept(out / "model.json", model, nothing_found)
+    assert why_kept(out / "model.json", model, file) == ""
+    assert why_kept(tmp_path / "model.json", model, nothing_found) == ""
+    of_others = msgspec.structs.replace(model, readings_sha256="0" * 64)
+    assert why_kept(out / "model.json", of_others, nothing_found) == ""
