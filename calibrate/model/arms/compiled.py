@@ -29,7 +29,7 @@ SOURCE = Path(__file__).with_name("fast.py")
 PER_PART = 7  # slots of a perturbed part: shift 3, turn 3, and the angle of the joint behind it
 # below, numba (0.4 to 0.5 s and 105 MB, once a process) is not worth loading: a diagnosis of 1,000 rows takes as long
 # with it as without
-WORTH_POSES = 2000
+WORTH_POSES = 3000
 
 
 @dataclass(frozen=True)
