@@ -1,9 +1,12 @@
 """The console command, also as `python -m calibeam`: it hears Ctrl-C before the libraries are loaded."""
 
+import gc
 import sys
 
 from calibeam import check_folders
 from calibeam.outcome import INTERRUPTS
+
+YOUNG = 50_000  # objects between two searches for cycles: libraries load hundreds of thousands, and all of them stay
 
 
 def main() -> None:
@@ -13,6 +16,7 @@ def main() -> None:
     except ImportError as another:
         sys.exit(f"error: {another}")
     INTERRUPTS.load()
+    gc.set_threshold(YOUNG)
     from calibeam.cli import main as run
 
     run()
