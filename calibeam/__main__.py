@@ -6,8 +6,6 @@ import sys
 from calibeam import check_folders
 from calibeam.outcome import INTERRUPTS
 
-YOUNG = 50_000  # objects between two searches for cycles: libraries load hundreds of thousands, and all of them stay
-
 
 def main() -> None:
     """Loads the command line, which takes up to a second, and runs it."""
@@ -16,7 +14,7 @@ def main() -> None:
     except ImportError as another:
         sys.exit(f"error: {another}")
     INTERRUPTS.load()
-    gc.set_threshold(YOUNG)
+    gc.set_threshold(50_000)  # objects between two searches for cycles: what the libraries load stays, and is a lot
     from calibeam.cli import main as run
 
     run()

@@ -49,11 +49,8 @@ def unrecorded(bench: Bench, rng: Generator, missing: Sequence[Missing] = ()) ->
     if not blocks or not asked:
         return None
     residual = _leverage_corrected(bench)
-    seen, null, restless = (
-        np.zeros((len(asked), len(LOUDNESS))),
-        np.zeros((len(asked), len(LOUDNESS), limits.SCATTER_DRAWS)),
-        0.0,
-    )
+    seen, restless = np.zeros((len(asked), len(LOUDNESS))), 0.0
+    null = np.zeros((*seen.shape, limits.SCATTER_DRAWS))
     for instrument, mine in blocks.items():
         unwhiten = _unwhitener(bench, instrument, mine)
         raw, levers = _turned(unwhiten, residual[mine]), [_felt(unwhiten, w, mine) for w in asked]

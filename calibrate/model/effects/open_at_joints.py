@@ -118,7 +118,7 @@ def _open(
     columns: int | None = None,
 ) -> Term:
     port, direction = at_joint(joint, drivers.n_joints)
-    columns = function(drivers, np.array([spec.grid[0] for spec in inner])).shape[1] if columns is None else columns
+    count = columns or function(drivers, np.array([spec.grid[0] for spec in inner])).shape[1]
     return Form(
         port,
         names,
@@ -130,7 +130,7 @@ def _open(
         slow=names == ("t",),
         open=True,
         function=function,
-        names=tuple(f"c{k}_rad" for k in range(1, columns + 1)),
+        names=tuple(f"c{k}_rad" for k in range(1, count + 1)),
         limit=LIMIT_RAD,
         sentence=f"Joint {joint} is off by an unknown function of {', '.join(names)}",
         directions=direction,
