@@ -1,5 +1,6 @@
 """The console command, also as `python -m calibeam`: it hears Ctrl-C before the libraries are loaded."""
 
+import gc
 import sys
 
 from calibeam import check_folders
@@ -13,6 +14,7 @@ def main() -> None:
     except ImportError as another:
         sys.exit(f"error: {another}")
     INTERRUPTS.load()
+    gc.set_threshold(50_000)  # objects between two searches for cycles: what the libraries load stays, and is a lot
     from calibeam.cli import main as run
 
     run()

@@ -49,18 +49,15 @@ def unrecorded(bench: Bench, rng: Generator, missing: Sequence[Missing] = ()) ->
     if not blocks or not asked:
         return None
     residual = _leverage_corrected(bench)
-    seen, null, restless = (
-        np.zeros((len(asked), len(LOUDNESS))),
-        np.zeros((len(asked), len(LOUDNESS), limits.SCATTER_DRAWS)),
-        0.0,
-    )
+    seen, restless = np.zeros((len(asked), len(LOUDNESS))), 0.0
+    null = np.zeros((*seen.shape, limits.SCATTER_DRAWS))
     for instrument, mine in blocks.items():
         unwhiten = _unwhitener(bench, instrument, mine)
         raw, levers = _turned(unwhiten, residual[mine]), [_felt(unwhiten, w, mine) for w in asked]
         base = _base(raw, asked, levers)
         restless += base.restless
         z = _turned(base.whitener, raw)
-        drawn = np.stack([z, *(z[rng.permutation(len(z))] for _ in range(limits.SCATTER_DRAWS))])
+        drawn = np.stack([z, *(z[rng.permutation(len(z))] for _ in range(limits.SCATTER_DRAWS))], axis=2)
         for i, lever_of in enumerate(levers):
             if asked[i].port.where == TIME:
                 continue
@@ -95,7 +92,7 @@ def _base(raw: Floats, asked: Sequence[Wish], levers: Sequence[Floats]) -> Innoc
         for w, one in zip(asked, levers, strict=True)
         if w.port.where != TIME
     ]
-    alone = max(float(_gains(one, z[None]).max()) for one in felt)
+    alone = max(float(_gains(one, z[..., None]).max()) for one in felt)
     return plain if plain.two_log_likelihood + alone > through.two_log_likelihood + limits.PORTS_TIED else through
 
 
@@ -106,12 +103,12 @@ def _said(asked: Sequence[Wish], best: Floats) -> int:
 
 
 def _gains(felt: Floats, z: Floats) -> Floats:
-    """(loudness, draw) of residuals z (draw, observation, k) with levers (lever, observation, k), noise estimated."""
+    """(loudness, draw) of residuals z (observation, k, draw) with levers (lever, observation, k), noise estimated."""
     w, V = spectrum(felt)
-    turned = (np.swapaxes(np.swapaxes(z, 0, 1) @ V, 0, 1) ** 2).reshape(len(z), -1)
-    rss, count = np.sum(z**2, axis=(1, 2)), turned.shape[1]
+    turned = ((np.swapaxes(V, 1, 2) @ z) ** 2).reshape(w.size, -1)
     width = 1.0 + np.array(LOUDNESS)[:, None] * w.reshape(-1)
-    return count * np.log(rss / ((1.0 / width) @ turned.T)) - np.sum(np.log(width), axis=1)[:, None]
+    left = (1.0 / width) @ turned
+    return w.size * np.log(np.sum(turned, axis=0) / left) - np.sum(np.log(width), axis=1)[:, None]
 
 
 def _leverage_corrected(bench: Bench) -> Floats:

@@ -133,12 +133,12 @@ def processes(bench: Bench, places: Sequence[tuple[Port, int]], drivers: int) ->
             return np.zeros((0, 1, columns.shape[1]))
 
         return Processes((), np.zeros((0, 1, 1)), nothing(basis), nothing, basis, bench.sight.data)
-    # In one piece, since products reshape them often.
-    shapes = np.ascontiguousarray([features([causes[n] for n in c], waves).T for c in names])
+    shapes = np.array([features([causes[n] for n in c], waves).T for c in names])
     asked: dict[tuple[Port, int], list[int]] = {}
     for place, c in wanted:
         asked.setdefault(place, []).append(names.index(c))
-    felt = [_Felt.of(bench, place, shapes, np.array(mine)) for place, mine in asked.items()]
+    of_names = {mine: shapes[list(mine)] for mine in set(map(tuple, asked.values()))}  # many places share them
+    felt = [_Felt.of(bench, place, of_names[tuple(mine)]) for place, mine in asked.items()]
 
     def products(columns: Floats) -> Floats:
         return np.concatenate([one.products(columns) for one in felt])
@@ -157,29 +157,27 @@ class _Felt:
     levers are never stored.
     """
 
-    shapes: Floats  # (driver or pair, k, sample) the same at all places
-    asked: Ints  # (curve,) of the drivers or pairs, those that act here
+    shapes: Floats  # (curve, k, sample) of the drivers or pairs that act here
     lever: csr_matrix  # (sample, row)
 
     @classmethod
-    def of(cls, bench: Bench, place: tuple[Port, int], shapes: Floats, asked: Ints) -> "_Felt":
+    def of(cls, bench: Bench, place: tuple[Port, int], shapes: Floats) -> "_Felt":
         rows, felt = bench.state.rows, lever(bench, *place)
         mine = np.flatnonzero(rows.data)
         by_sample = csr_matrix((felt[mine], (rows.sample[mine], mine)), shape=(shapes.shape[2], len(felt)))
-        return cls(shapes, asked, by_sample)
+        return cls(shapes, by_sample)
 
     def products(self, columns: Floats) -> Floats:
         """(curve, k, m) with columns (row, m)."""
         count, k, samples = self.shapes.shape
         through = np.asarray(self.lever @ columns)
-        return (self.shapes.reshape(-1, samples) @ through).reshape(count, k, -1)[self.asked]
+        return (self.shapes.reshape(-1, samples) @ through).reshape(count, k, -1)
 
     @property
     def gram(self) -> Floats:
         """(curve, k, k)"""
         square = np.asarray(self.lever.multiply(self.lever).sum(axis=1)).ravel()
-        shapes = self.shapes[self.asked]
-        return (shapes * square) @ np.swapaxes(shapes, 1, 2)
+        return (self.shapes * square) @ np.swapaxes(self.shapes, 1, 2)
 
 
 def lever(bench: Bench, port: Port, component: int) -> Floats:

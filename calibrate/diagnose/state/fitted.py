@@ -196,15 +196,15 @@ class Fitted:
         drivers, sample, rows = self.drivers, self._labels[0], len(self.rows.residual)
         directions = term.along(drivers) if isinstance(term, Form) else None
         if isinstance(term, Form) and directions is not None and self._single:
-            values = np.swapaxes([self.listed.function(term, one) for one in inner], 1, 2)[:, :, None, sample]
+            values = np.swapaxes([self.listed.function(term, one) for one in inner], 1, 2).take(sample, axis=2)
             lever = directions.T @ self._lever(term.port, len(directions))
             out = np.empty((len(inner), values.shape[1], len(lever), rows))
-            np.multiply(values, lever, out=out[..., : len(sample)])
+            np.multiply(values[:, :, None], lever, out=out[..., : len(sample)])
         else:
             basis = np.stack([term.basis(drivers, one) for one in inner])
             out = np.empty((len(inner), basis.shape[3], rows))
             out[..., : len(sample)] = (
-                np.einsum("wr,erwm->emr", self._lever(term.port, basis.shape[2]), basis[:, sample])
+                np.einsum("wr,erwm->emr", self._lever(term.port, basis.shape[2]), basis.take(sample, axis=1))
                 if self._single
                 else [self._felt(term.port, one) for one in basis]
             )

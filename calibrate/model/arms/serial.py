@@ -10,6 +10,7 @@ Manipulation, 1994, ch. 3.4 (body and spatial manipulator Jacobian).
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from copy import copy
+from itertools import pairwise
 from typing import Self
 
 import numpy as np
@@ -28,12 +29,12 @@ class SerialArm(ABC):
     """KinematicModel of a chain; a kind of arm states what its parameters do to fixed parts and joint offsets."""
 
     def __init__(self, n_joints: int, parameters: tuple[Parameter, ...], moves_frame: tuple[int, ...]) -> None:
-        """`moves_frame`: for each parameter the i of the frame B_i in which its twist is constant."""
+        """`moves_frame`: for each parameter the i of the frame B_i in which its twist is constant, in rising order."""
         self.n_joints = n_joints
         self.parameters = parameters
         self.moves_frame = moves_frame
         self.by_reading: Floats | None = None  # (joint, joint) of coupled readings; None: angles from the links
-        self._columns_of = [np.flatnonzero(np.array(moves_frame) == i) for i in range(n_joints + 1)]
+        self._columns_of = [slice(*ends) for ends in pairwise(np.searchsorted(moves_frame, range(n_joints + 2)))]
         self.latest: tuple[tuple[bytes, bytes] | None, Floats] = None, np.empty(0)  # of `frames`: asked, answered
 
     @abstractmethod

@@ -4,7 +4,6 @@ from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import gaussian_filter1d
 
 from acquisition.recording import Samples
 from acquisition.recording.rig import Arm
@@ -119,6 +118,8 @@ def temperatures_of(samples: Samples) -> dict[str, Floats]:
     out: dict[str, Floats] = {}
     for name in samples.names:
         if _is_temperature(name) and _recorded(samples, name):
+            from scipy.ndimage import gaussian_filter1d  # without temperatures a command starts sooner
+
             read = samples.column(name)
             known = order[np.isfinite(read[order])]
             values = np.interp(t, t[known], read[known])

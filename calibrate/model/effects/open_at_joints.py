@@ -2,6 +2,7 @@
 physics is named.
 """
 
+from collections.abc import Mapping
 from itertools import combinations
 
 import numpy as np
@@ -33,11 +34,14 @@ LIMIT_RAD = 5e-2  # nobody would call a larger error an unknown effect: a gross 
 def _terms(drivers: Drivers) -> tuple[Term, ...]:
     out: list[Term] = []
     turned = [k for k in range(1, drivers.n_joints + 1) if varies(drivers.q_rad[:, k - 1])]
+    pairs = {pair: _of_two(*pair) for pair in combinations(turned, 2)}  # functions once: all joints share their values
     for joint in range(1, drivers.n_joints + 1):
         if joint in turned:
             out += _of_itself(drivers, joint)
-        for a, b in combinations(turned, 2):
-            out += _of_two(drivers, joint, a, b)
+        for (a, b), functions in pairs.items():
+            names = f"q{a}", f"q{b}"
+            for variant, (function, columns) in functions.items():
+                out.append(_open(drivers, joint, names, Shape.PRODUCT, function, variant, columns=columns))
         if loaded(drivers, joint):
             out += _of_load(drivers, joint)
         out.append(_open(drivers, joint, ("t",), Shape.SMOOTH, lambda d, inner: splines(d, d.t_s)))
@@ -64,8 +68,8 @@ def _of_itself(drivers: Drivers, joint: int) -> list[Term]:
     ]
 
 
-def _of_two(drivers: Drivers, joint: int, a: int, b: int) -> list[Term]:
-    names = (f"q{a}", f"q{b}")
+def _of_two(a: int, b: int) -> Mapping[str, tuple[Functions, int]]:
+    """Of each variant the function, and how many columns it has."""
 
     def sums(drivers: Drivers, inner: Floats) -> Floats:
         x, y = drivers.q_rad[:, a - 1], drivers.q_rad[:, b - 1]
@@ -79,11 +83,7 @@ def _of_two(drivers: Drivers, joint: int, a: int, b: int) -> list[Term]:
         x, y = (centred(drivers, drivers.q_rad[:, k - 1]) for k in (a, b))
         return np.stack([x * y, x**2 * y, x * y**2, x**2 * y**2], axis=1)
 
-    return [
-        _open(drivers, joint, names, Shape.PRODUCT, sums, "sums"),
-        _open(drivers, joint, names, Shape.PRODUCT, double_sums, "sums with a double"),
-        _open(drivers, joint, names, Shape.PRODUCT, products, "products"),
-    ]
+    return {"sums": (sums, 4), "sums with a double": (double_sums, 8), "products": (products, 4)}
 
 
 def _of_load(drivers: Drivers, joint: int) -> list[Term]:
@@ -115,9 +115,10 @@ def _open(
     function: Functions,
     variant: str = "",
     inner: tuple[Inner, ...] = (),
+    columns: int | None = None,
 ) -> Term:
     port, direction = at_joint(joint, drivers.n_joints)
-    columns = function(drivers, np.array([spec.grid[0] for spec in inner])).shape[1]
+    count = columns or function(drivers, np.array([spec.grid[0] for spec in inner])).shape[1]
     return Form(
         port,
         names,
@@ -129,7 +130,7 @@ def _open(
         slow=names == ("t",),
         open=True,
         function=function,
-        names=tuple(f"c{k}_rad" for k in range(1, columns + 1)),
+        names=tuple(f"c{k}_rad" for k in range(1, count + 1)),
         limit=LIMIT_RAD,
         sentence=f"Joint {joint} is off by an unknown function of {', '.join(names)}",
         directions=direction,
