@@ -87,14 +87,17 @@ class SerialArm(ABC):
 
     def twists_at(self, theta: Floats, B: Floats) -> Floats:
         """(pose, 6, param) as `twists`, of frames (pose, joint + 1, 4, 4) that more than theta may have moved."""
-        body = self.body_twists(theta).reshape(-1, 2, 3)
-        out, about_base = np.empty((len(B), 6, len(self.parameters))), cross_matrix(B[..., :3, 3])
+        body, out = self.body_twists(theta), np.empty((len(B), 6, len(self.parameters)))
         for i, columns in enumerate(self._columns_of):
-            own = body[columns]  # (param, 2, 3)
-            seen = (B[:, i, :3, :3].reshape(-1, 3) @ own.reshape(-1, 3).T).reshape(len(B), 3, len(own), 2)
-            out[:, 3:, columns] = turns = seen[..., 1]
-            out[:, :3, columns] = seen[..., 0] + about_base[:, i] @ turns
+            out[:, :, columns] = twists_of(body[columns], B[:, i])
         return out
+
+
+def twists_of(body: Floats, B: Floats) -> Floats:
+    """(pose, 6, param) base twists of what moves with twists `body` (param, 6) in frames (pose, 4, 4)."""
+    seen = (B[:, :3, :3].reshape(-1, 3) @ body.reshape(-1, 3).T).reshape(len(B), 3, len(body), 2)
+    turns = seen[..., 1]
+    return np.concatenate([seen[..., 0] + cross_matrix(B[:, :3, 3]) @ turns, turns], axis=1)
 
 
 def point_by_parameter(model: KinematicModel, theta: Floats, point_m: Floats, q_rad: Floats) -> tuple[Floats, Floats]:

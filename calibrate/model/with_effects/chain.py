@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibrate.model.arms.coupled_readings import by_readings, recoupled
-from calibrate.model.arms.serial import SerialArm
+from calibrate.model.arms.serial import SerialArm, twists_of
 from calibrate.model.effects.drivers import Drivers
 from calibrate.model.effects.ports import Perturbation, Place, Port
 from calibrate.model.effects.term import Accepted
@@ -282,10 +282,11 @@ def twists_by_arm(arm: SerialArm, theta: Floats, q_rad: Floats, by: Perturbation
     """
     if not (np.any(by.frames) or np.any(by.surroundings)):
         return arm.twists(theta, q_rad + recoupled(arm.by_reading, by.joints_rad))
-    B = frames.copy()
+    out, body = arm.twists_at(theta, frames), arm.body_twists(theta)
     for i in np.flatnonzero(np.any(by.frames != 0.0, axis=(0, 2))):
-        B[:, i] = B[:, i] @ inverse(offsets(by.frames[:, i]))
-    return np.where(ends_of_links(arm), arm.twists_at(theta, B), arm.twists_at(theta, frames))
+        before = ends_of_links(arm) & (np.array(arm.moves_frame) == i)
+        out[:, :, before] = twists_of(body[before], frames[:, i] @ inverse(offsets(by.frames[:, i])))
+    return out
 
 
 @lru_cache(maxsize=KEPT)
