@@ -8,8 +8,6 @@ from pathlib import Path
 
 from acquisition.recording.rig import load_rig, plain_rig, rig_text
 from benchmarks import (
-    beside_model,
-    blunders,
     can_frames,
     centring,
     centring_plot,
@@ -23,6 +21,7 @@ from benchmarks import (
     error_simulation,
     false_alarms,
     fleet,
+    gross_errors,
     inverse,
     killed,
     live,
@@ -40,6 +39,7 @@ from benchmarks import (
     stops,
     streams,
     wired_streams,
+    with_known_model,
     zeros,
 )
 
@@ -96,13 +96,13 @@ def run_coverage() -> None:
 
 def run_beside_model(seeds: range | None = None) -> None:
     print("beside a known model: its own recording, an unchanged later one, and one after a change drawn at random")
-    for row in beside_model.lines(seeds or range(beside_model.FIRST_SEED, beside_model.FIRST_SEED + 10)):
+    for row in with_known_model.lines(seeds or range(with_known_model.FIRST_SEED, with_known_model.FIRST_SEED + 10)):
         print(row, flush=True)
 
 
 def run_blunders() -> None:
     print("blunders put into sessions at random rows and joints, and healthy sessions of every instrument")
-    for row in blunders.lines(RIG, RIG.parents[2] / "shared" / "data"):
+    for row in gross_errors.lines(RIG, RIG.parents[2] / "shared" / "data"):
         print(row, flush=True)
 
 

@@ -13,8 +13,8 @@ import numpy as np
 from scipy.stats import beta
 
 from acquisition.recording.session_folder import read_folder
-from calibrate.diagnose.doubts.diagnosis import Verdict
-from calibrate.diagnose.doubts.doubt import Assessed, assessed
+from calibrate.diagnose.assess.assessment import Assessed, assessed
+from calibrate.diagnose.assess.diagnosis import Verdict
 from calibrate.diagnose.state.fitted import fit_geometry
 from calibrate.diagnose.state.session import session_of
 from calibrate.model.effects.catalogue import missing_of

@@ -25,7 +25,7 @@ from calibeam.prove.diagnosing import Answered, diagnose_cases
 from calibeam.prove.prove import ending_early, fresh
 from calibeam.prove.seal import Layout
 from calibeam.software import SOFTWARE
-from calibrate.diagnose.doubts.unseen_rows import splits_of
+from calibrate.diagnose.assess.unseen_rows import splits_of
 from calibrate.diagnose.record.file import read_diagnosis
 from calibrate.diagnose.record.schema import CurveRecord, DiagnosisFile
 from calibrate.diagnose.state.fitted import Fitted, fit_geometry

@@ -18,7 +18,7 @@ from acquisition.session.session import Session
 from calibeam.devices.recorder import RecordingJournal
 from calibeam.learner import FittedLearner
 from calibeam.results.diagnosis import diagnose_recording, plan_next
-from calibrate.diagnose.doubts.diagnosis import Named
+from calibrate.diagnose.assess.diagnosis import Named
 from calibrate.diagnose.new_poses.contests import rival_named
 from calibrate.diagnose.search.bench import Bench
 from calibrate.diagnose.search.line_search import refined

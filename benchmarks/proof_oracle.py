@@ -16,10 +16,10 @@ from benchmarks.proof_baselines import Method, features, installed
 from calibeam.prove.record import ProofRecord, TrueDefect, Truth
 from calibeam.prove.scoring import errors_m, same_place
 from calibeam.prove.unseen import read_asked, tool_at
-from calibrate.diagnose.doubts.findings import (
+from calibrate.diagnose.assess.findings import (
     named,
 )
-from calibrate.diagnose.doubts.unseen_rows import (
+from calibrate.diagnose.assess.unseen_rows import (
     splits_of,
 )
 from calibrate.diagnose.record.file import (

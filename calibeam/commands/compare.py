@@ -14,7 +14,7 @@ from calibeam.printing.comparison_lines import print_comparison
 from calibeam.results.comparison import compare
 from calibeam.results.identification import naming_source
 from calibeam.results.simulator import TIMEOUT_S, Simulator, simulated_by
-from calibrate.diagnose.doubts import Verdict
+from calibrate.diagnose.assess import Verdict
 from calibrate.errors import DataError
 from calibrate.model.model_file import ModelFile, read_model
 

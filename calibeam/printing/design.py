@@ -9,7 +9,7 @@ from calibeam.console import Console
 from calibeam.printing.tables import plain_table
 from calibeam.rig_files import of_one_point
 from calibrate.design import Design, Places, Seen
-from calibrate.diagnose.doubts import Named, Smallest
+from calibrate.diagnose.assess import Named, Smallest
 from calibrate.quantities import counted, length
 from calibrate.report.diagnosis import size_of
 from calibrate.report.pose_design_page import of_the_curve

@@ -11,7 +11,7 @@ from acquisition.recording import Recording
 from acquisition.recording.pose_plan import write_pose_plan
 from acquisition.recording.rig import rig_sha256
 from calibeam.software import SOFTWARE
-from calibrate.diagnose.doubts import Verdict
+from calibrate.diagnose.assess import Verdict
 from calibrate.diagnose.from_recording import Diagnosed, diagnose_samples
 from calibrate.diagnose.new_poses import plan_of, separating
 from calibrate.diagnose.record.file import write_diagnosis

@@ -17,10 +17,10 @@ from calibeam.results.diagnosis import diagnose_recording
 from calibeam.results.identification import Planned, identify_session, session_model
 from calibeam.simulation.replayed_recording import Replayed, replay
 from calibeam.software import SOFTWARE
-from calibrate.compare.beside_simulation import device_between
 from calibrate.compare.compare_recordings import compare
 from calibrate.compare.comparison_file import ComparisonFile
 from calibrate.compare.corrected import corrected_samples, simulated_of
+from calibrate.compare.fit_to_simulation import device_between
 from calibrate.compare.matched import match
 from calibrate.compare.reconciled_rows import (
     AGREES,

@@ -10,9 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.recording import Recording, Samples
-from calibrate.compare.beside_simulation import (
-    Constant,
-)
 from calibrate.compare.chain import (
     READINGS,
     Pair,
@@ -29,6 +26,9 @@ from calibrate.compare.comparison_file import (
     StreamRecord,
 )
 from calibrate.compare.difference_explained import Explanation, explain, notes_of
+from calibrate.compare.fit_to_simulation import (
+    Constant,
+)
 from calibrate.compare.link_differs import (
     ROUNDING,
     Parted,
@@ -48,7 +48,7 @@ from calibrate.compare.streams import (
     late_against_joints,
     stream_pairs,
 )
-from calibrate.diagnose.doubts import Named, Verdict
+from calibrate.diagnose.assess import Named, Verdict
 from calibrate.diagnose.record.schema import SizeRecord
 from calibrate.diagnose.streams import devices_of
 from calibrate.errors import DataError

@@ -10,7 +10,7 @@ from calibrate.compare.link_differs import (
     Parted,
 )
 from calibrate.compare.rig_keys import RigKey
-from calibrate.diagnose.doubts import Named
+from calibrate.diagnose.assess import Named
 from calibrate.diagnose.record.schema import DiagnosisFile, SizeRecord
 from calibrate.model.effects.term import Size, with_sigma
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from calibrate.diagnose.doubts import Named
+from calibrate.diagnose.assess import Named
 from calibrate.diagnose.state import Fitted, blind
 from calibrate.model.effects.moved import RECORDING
 from calibrate.model.effects.term import Shape

@@ -8,19 +8,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.recording import Recording
-from calibrate.compare.beside_simulation import (
-    Beside,
-    begin,
-    beside,
-    beside_structure,
-    set_alike,
-)
 from calibrate.compare.chain import (
     Pair,
     of_rig,
 )
 from calibrate.compare.comparison_file import Level, Mismatch, ReadingRecord
 from calibrate.compare.corrected import compared_session, corrected_samples, simulated_of
+from calibrate.compare.fit_to_simulation import (
+    Beside,
+    begin,
+    beside,
+    beside_structure,
+    set_alike,
+)
 from calibrate.compare.link_differs import (
     ALARM,
     ROUNDING,

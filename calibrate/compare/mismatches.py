@@ -10,11 +10,11 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from calibrate.compare.beside_simulation import Beside, Constant
 from calibrate.compare.comparison_file import TARGET, Level, Mismatch, Side, in_words
 from calibrate.compare.constants import LINK, ZERO
 from calibrate.compare.corrected import Simulated
-from calibrate.diagnose.doubts import Finding, named
+from calibrate.compare.fit_to_simulation import Beside, Constant
+from calibrate.diagnose.assess import Finding, named
 from calibrate.diagnose.search import Bench, sizes_of
 from calibrate.diagnose.state import Fitted
 from calibrate.model.effects.moved import (

@@ -13,14 +13,14 @@ from scipy.stats import chi2
 from acquisition.recording import Recording, Samples
 from acquisition.recording.rig import Rig
 from acquisition.recording.samples import ORIENTATION, POSITION, SPOTS, WIRE
-from calibrate.compare.beside_simulation import device_between
 from calibrate.compare.comparison_file import ComparisonFile
 from calibrate.compare.corrected import simulated_of
+from calibrate.compare.fit_to_simulation import device_between
 from calibrate.compare.matched import (
     is_seated,
 )
 from calibrate.diagnose import limits
-from calibrate.diagnose.doubts import Verdict
+from calibrate.diagnose.assess import Verdict
 from calibrate.diagnose.record.schema import DiagnosisFile
 from calibrate.errors import DataError
 from calibrate.model.sensors import (

@@ -7,9 +7,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.recording import Recording
-from calibrate.compare.beside_simulation import (
-    Beside,
-)
 from calibrate.compare.chain import (
     Difference,
 )
@@ -17,6 +14,9 @@ from calibrate.compare.comparison_file import (
     Level,
     Mismatch,
     Side,
+)
+from calibrate.compare.fit_to_simulation import (
+    Beside,
 )
 from calibrate.compare.link_differs import (
     Parted,

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from calibrate.diagnose.doubts import Named
+from calibrate.diagnose.assess import Named
 from calibrate.diagnose.streams import (
     ClockFit,
     ClockStatus,

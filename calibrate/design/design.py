@@ -34,7 +34,7 @@ from calibrate.design.exchange import (
 from calibrate.design.information import Information
 from calibrate.design.places import Places
 from calibrate.design.seen import Seen
-from calibrate.diagnose.doubts import Named
+from calibrate.diagnose.assess import Named
 from calibrate.diagnose.new_poses import short_way
 from calibrate.errors import DataError
 

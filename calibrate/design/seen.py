@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from acquisition.recording.rig import Rig
 from calibrate.design.candidates import Candidates, Taken
-from calibrate.diagnose.doubts import Isolability, Named, Smallest, isolability, named, smallest_visible
+from calibrate.diagnose.assess import Isolability, Named, Smallest, isolability, named, smallest_visible
 from calibrate.diagnose.search import Bench
 from calibrate.diagnose.state import fit_geometry, session_of
 from calibrate.model.dual_psd_rig import assumed_noise

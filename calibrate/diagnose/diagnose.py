@@ -10,17 +10,17 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from calibrate.diagnose.doubts.diagnosis import (
+from calibrate.diagnose.assess.assessment import Assessed, assessed
+from calibrate.diagnose.assess.diagnosis import (
     Diagnosis,
     Finding,
     Named,
     Rejected,
     RivalName,
 )
-from calibrate.diagnose.doubts.doubt import Assessed, assessed
-from calibrate.diagnose.doubts.findings import named
-from calibrate.diagnose.doubts.missing_columns import separated_by_time
-from calibrate.diagnose.doubts.unseen_rows import floors, proofs
+from calibrate.diagnose.assess.findings import named
+from calibrate.diagnose.assess.missing_columns import separated_by_time
+from calibrate.diagnose.assess.unseen_rows import floors, proofs
 from calibrate.diagnose.search.bench import recent_menu
 from calibrate.diagnose.search.noise_law import noise_law
 from calibrate.diagnose.search.searching import Search

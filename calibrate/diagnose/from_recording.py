@@ -14,18 +14,18 @@ from scipy.special import ndtr
 from acquisition.recording import Samples
 from acquisition.recording.rig import Rig
 from calibrate.diagnose import limits
-from calibrate.diagnose.diagnose import diagnose
-from calibrate.diagnose.doubts.diagnosis import Diagnosis, Unexplained, Verdict
-from calibrate.diagnose.doubts.doubt import records
-from calibrate.diagnose.doubts.free_space_change import FreeSpaceChange, free_space_change
-from calibrate.diagnose.doubts.missing_columns import TIME, doubtful
-from calibrate.diagnose.doubts.stated_noise import (
+from calibrate.diagnose.assess.assessment import records
+from calibrate.diagnose.assess.diagnosis import Diagnosis, Unexplained, Verdict
+from calibrate.diagnose.assess.free_space_change import FreeSpaceChange, free_space_change
+from calibrate.diagnose.assess.missing_columns import TIME, doubtful
+from calibrate.diagnose.assess.stated_noise import (
     NoiseFound,
     Statement,
     hidden_of,
     missing_words,
     noise_found,
 )
+from calibrate.diagnose.diagnose import diagnose
 from calibrate.diagnose.gross_errors import Cleared, blunders_first, unexplained_rows
 from calibrate.diagnose.search import limits as search_limits
 from calibrate.diagnose.stages import (

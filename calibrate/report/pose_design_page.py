@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from acquisition.recording.rig import Rig
 from calibrate.design import Design, Places, Seen
-from calibrate.diagnose.doubts import Named
+from calibrate.diagnose.assess import Named
 from calibrate.quantities import length
 from calibrate.report.diagnosis.words import size_of
 from calibrate.report.elements.html import (

@@ -8,9 +8,9 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 
 from calibrate.diagnose import limits
-from calibrate.diagnose.doubts.diagnosis import Diagnosis, Named
-from calibrate.diagnose.doubts.findings import named
-from calibrate.diagnose.doubts.missing_columns import separated_by_time
+from calibrate.diagnose.assess.diagnosis import Diagnosis, Named
+from calibrate.diagnose.assess.findings import named
+from calibrate.diagnose.assess.missing_columns import separated_by_time
 from calibrate.diagnose.new_poses.longer_session import Elsewhere, NewPoses, elsewhere
 from calibrate.diagnose.new_poses.next_poses import Contest, Duel, next_poses, reach_of
 from calibrate.diagnose.new_poses.reachable import reachable

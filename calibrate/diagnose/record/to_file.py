@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 
 from acquisition.recording import Recording
 from acquisition.recording.rig import rig_sha256
-from calibrate.diagnose.doubts.detection_limits import Smallest, isolability, smallest_visible
-from calibrate.diagnose.doubts.diagnosis import (
+from calibrate.diagnose.assess.detection_limits import Smallest, isolability, smallest_visible
+from calibrate.diagnose.assess.diagnosis import (
     Diagnosis,
     Finding,
     Named,
@@ -19,9 +19,9 @@ from calibrate.diagnose.doubts.diagnosis import (
     Unexplained,
     Verdict,
 )
-from calibrate.diagnose.doubts.findings import named
-from calibrate.diagnose.doubts.stated_noise import NoiseFound
-from calibrate.diagnose.doubts.unseen_rows import Floor, HeldOutProof
+from calibrate.diagnose.assess.findings import named
+from calibrate.diagnose.assess.stated_noise import NoiseFound
+from calibrate.diagnose.assess.unseen_rows import Floor, HeldOutProof
 from calibrate.diagnose.from_recording import Diagnosed, Physics
 from calibrate.diagnose.record.schema import (
     SCHEMA,

@@ -3,7 +3,7 @@ term is accepted or dropped.
 
 Modules write `limits.ALPHA_FIRST`: a reader sees at once that the number is on this page, and a test changes it in one
 place. Numerical constants of an algorithm (steps of difference quotients, guards against rounding, grids, chunks of an
-array) stay where they are used. `diagnose`, `diagnose/doubts` and `diagnose/streams` have a page of the same name each.
+array) stay where they are used. `diagnose`, `diagnose/assess` and `diagnose/streams` have a page of the same name each.
 
 BIC is in units of 2 ln L; 2 is no more than a bare mention, 6 strong and 10 very strong evidence (Kass, Raftery, Bayes
 factors, J. Am. Stat. Assoc. 90(430), 1995, section 3.2).

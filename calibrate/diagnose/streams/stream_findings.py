@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from calibrate.diagnose.doubts.diagnosis import Named
+from calibrate.diagnose.assess.diagnosis import Named
 from calibrate.diagnose.streams import limits
 from calibrate.diagnose.streams.clock_faults import Late
 from calibrate.diagnose.streams.continuity import Break, Fault

@@ -18,7 +18,7 @@ from msgspec.structs import replace
 from numpy.typing import NDArray
 
 from acquisition.recording import Recording
-from calibrate.diagnose.doubts.diagnosis import NAMED, Named, Verdict
+from calibrate.diagnose.assess.diagnosis import NAMED, Named, Verdict
 from calibrate.diagnose.record.schema import (
     ClockRecord,
     DiagnosisFile,

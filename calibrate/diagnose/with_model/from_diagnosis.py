@@ -16,8 +16,8 @@ from acquisition.recording.rig import ArmModel, rig_sha256
 from acquisition.recording.samples import measured_sha256
 from calibrate.apply.export import dh_table_of
 from calibrate.apply.predicting import as_fitted
-from calibrate.diagnose.doubts.diagnosis import UNKNOWN, Diagnosis, Finding
-from calibrate.diagnose.doubts.findings import named
+from calibrate.diagnose.assess.diagnosis import UNKNOWN, Diagnosis, Finding
+from calibrate.diagnose.assess.findings import named
 from calibrate.diagnose.from_recording import Diagnosed
 from calibrate.diagnose.gross_errors import Cleared
 from calibrate.diagnose.search.bench import Bench

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from msgspec import structs
 
 from acquisition.recording import Recording
-from calibrate.diagnose.doubts.diagnosis import Verdict
+from calibrate.diagnose.assess.diagnosis import Verdict
 from calibrate.diagnose.from_recording import Diagnosed
 from calibrate.diagnose.gross_errors import blunders_first
 from calibrate.diagnose.record.schema import (

@@ -3,7 +3,7 @@
 import re
 from collections.abc import Iterator, Sequence
 
-from calibrate.diagnose.doubts import Statement
+from calibrate.diagnose.assess import Statement
 from calibrate.diagnose.record.schema import (
     ClockRecord,
     DiagnosisFile,

@@ -15,8 +15,8 @@ from benchmarks.proof_oracle import GEOMETRY, compare, fold_of, oracle_terms
 from calibeam.prove.record import Truth, truth_of
 from calibeam.prove.scoring import errors_m
 from calibeam.prove.unseen import tool_at, write_asked
-from calibrate.diagnose.doubts.diagnosis import Verdict
-from calibrate.diagnose.doubts.unseen_rows import splits_of
+from calibrate.diagnose.assess.diagnosis import Verdict
+from calibrate.diagnose.assess.unseen_rows import splits_of
 from calibrate.diagnose.record.file import write_diagnosis
 from calibrate.diagnose.record.schema import DiagnosisFile
 from calibrate.diagnose.search.bench import Bench

@@ -8,8 +8,8 @@ from rich.console import Console
 
 from calibeam.printing.comparison_lines import print_comparison
 from calibeam.results.comparison import compare
-from calibrate.compare.beside_simulation import beside
 from calibrate.compare.corrected import simulated_of
+from calibrate.compare.fit_to_simulation import beside
 from simulators.conceal.case_files import Made
 from tests.calibrate.compare.drawn_pairs import case_of, pair_of
 
@@ -70,7 +70,7 @@ def test_what_only_the_simulation_has_is_named_and_has_its_side(kind, tmp_path):
     assert f"Only the simulation has it: {hidden.PHYSICS} at {hidden.port}. Joint" in printed(said)
 
 
-@pytest.mark.endure  # six arms; daily: tests/calibrate/diagnose/doubts/test_doubt.py
+@pytest.mark.endure  # six arms; daily: tests/calibrate/diagnose/assess/test_assessment.py
 def test_sigmas_hold_where_constants_were_dropped(tmp_path):
     off_by, kept, lost = [], 0, 0
     for seed in SEEDS:

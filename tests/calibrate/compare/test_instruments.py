@@ -129,7 +129,7 @@ def test_an_end_of_a_bar_whose_other_end_is_missing_has_no_partner(probed):
     assert said.matched == len(samples) - 2
 
 
-@pytest.mark.endure  # daily: a wrong statement of one session, in tests/calibrate/diagnose/doubts/test_stated_noise.py
+@pytest.mark.endure  # daily: a wrong statement of one session, in tests/calibrate/diagnose/assess/test_stated_noise.py
 def test_a_noise_stated_far_too_small_is_a_wrong_statement_of_both_sides_and_no_mismatch(tmp_path):
     """7.5 times too small: a difference of two sessions scatters by 10.6 times, more than statements are wrong by."""
     drawn = recording_of(tmp_path, family="tracker", seed=3, samples=80)
@@ -146,7 +146,7 @@ def test_a_noise_stated_far_too_small_is_a_wrong_statement_of_both_sides_and_no_
     assert noise.stated == pytest.approx(np.sqrt(2.0) * 1e-6)
 
 
-@pytest.mark.endure  # daily: a blind joint of one session, in tests/calibrate/diagnose/doubts/test_blind_joints.py
+@pytest.mark.endure  # daily: a blind joint of one session, in tests/calibrate/diagnose/assess/test_blind_joints.py
 def test_of_a_joint_on_whose_axis_the_target_lies_no_zero_is_told(tmp_path):
     """The target stands a tenth of a millimetre off its axis, which a turn of the joint could explain."""
     drawn = recording_of(tmp_path, family="tracker", seed=3, samples=80)

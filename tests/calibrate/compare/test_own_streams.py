@@ -1,7 +1,7 @@
 """What each recording's streams show, side by side."""
 
 from calibrate.compare.streams import stream_differences
-from calibrate.diagnose.doubts.diagnosis import Named
+from calibrate.diagnose.assess.diagnosis import Named
 from calibrate.diagnose.streams.examine import StreamReport
 from calibrate.diagnose.streams.stream_findings import StreamFinding
 from calibrate.diagnose.streams.track import Outcome

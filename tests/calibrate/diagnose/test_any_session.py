@@ -6,7 +6,7 @@ import pytest
 
 from acquisition.recording import RecordingError, RigFileError, SamplesError, read
 from calibeam.results.diagnosis import diagnose_to_file
-from calibrate.diagnose.doubts.diagnosis import Verdict
+from calibrate.diagnose.assess.diagnosis import Verdict
 from calibrate.errors import DataError
 from tests.calibrate.diagnose.drawn_rigs import drawn
 

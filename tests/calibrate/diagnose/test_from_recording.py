@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from acquisition.recording import read
-from calibrate.diagnose.doubts.diagnosis import Verdict
+from calibrate.diagnose.assess.diagnosis import Verdict
 from calibrate.diagnose.from_recording import diagnose_samples, runs_of
 from calibrate.diagnose.record.to_file import file_of
 from calibrate.diagnose.state.fitted import fit_geometry

@@ -10,7 +10,7 @@ from acquisition.recording import read
 from benchmarks.real_diagnosis import apart, errors_m, rms_um, through_a_file
 from calibeam.results.diagnosis import diagnose_recording
 from calibeam.results.identification import identify_session, session_model
-from calibrate.diagnose.doubts.doubt import assessed
+from calibrate.diagnose.assess.assessment import assessed
 from calibrate.diagnose.state.fitted import fit_geometry
 from calibrate.diagnose.state.session import session_of
 from calibrate.diagnose.with_model.from_diagnosis import model_of_diagnosis

@@ -9,7 +9,7 @@ import pytest
 
 from acquisition.recording import read
 from calibeam.cli import run
-from calibrate.diagnose.doubts.diagnosis import Verdict
+from calibrate.diagnose.assess.diagnosis import Verdict
 from calibrate.diagnose.from_recording import diagnose_samples
 from calibrate.model.model_file import read_model
 from calibrate.report.evidence.model_tests import proofs

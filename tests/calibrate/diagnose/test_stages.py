@@ -9,9 +9,9 @@ import pytest
 from acquisition.recording import read
 from calibeam.results.diagnosis import diagnose_to_file
 from calibrate.diagnose import from_recording
+from calibrate.diagnose.assess import assessment
+from calibrate.diagnose.assess.diagnosis import Verdict
 from calibrate.diagnose.diagnose import diagnose
-from calibrate.diagnose.doubts import doubt
-from calibrate.diagnose.doubts.diagnosis import Verdict
 from calibrate.diagnose.search.bench import Bench, recent_menu
 from calibrate.diagnose.search.port_process import processes
 from calibrate.diagnose.search.score import Removed
@@ -58,7 +58,7 @@ def test_a_stage_that_refuses_says_what_is_wrong_with_the_data():
 def test_causes_are_known_before_sizes_and_stay_when_everything_after_them_fails(world, monkeypatch):
     names = ("rivals_of", "unrecorded", "lack_of_fit", "findings_of")
     for name in names:
-        monkeypatch.setattr(doubt, name, broken)
+        monkeypatch.setattr(assessment, name, broken)
     monkeypatch.setattr("calibrate.diagnose.diagnose.proofs", broken)
     rng, early = np.random.default_rng(3), []
     said = diagnose(effect(world, rng), rng, known=early.append)
@@ -82,7 +82,7 @@ def test_causes_stay_when_the_last_refit_fails(world, monkeypatch):
 
 
 def test_a_session_that_could_not_be_searched_is_not_consistent(world, monkeypatch):
-    monkeypatch.setattr(doubt, "search", broken)
+    monkeypatch.setattr(assessment, "search", broken)
     rng = np.random.default_rng(4)
     said = diagnose(world.session(rng), rng)
     assert said.verdict is Verdict.UNDECIDABLE

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from calibrate.diagnose.assess.diagnosis import Verdict
+from calibrate.diagnose.assess.unseen_rows import near_in_time
 from calibrate.diagnose.diagnose import diagnose
-from calibrate.diagnose.doubts.diagnosis import Verdict
-from calibrate.diagnose.doubts.unseen_rows import near_in_time
 from calibrate.diagnose.search.bench import Bench
 from calibrate.diagnose.time_left import time_left
 

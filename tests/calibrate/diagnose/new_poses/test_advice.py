@@ -2,13 +2,13 @@
 
 from dataclasses import replace
 
+from calibrate.diagnose.assess.diagnosis import Finding, Named, RivalName
 from calibrate.diagnose.diagnose import (
     COOLED,
     POSES,
     WITNESS,
     to_measure,
 )
-from calibrate.diagnose.doubts.diagnosis import Finding, Named, RivalName
 
 GROWTH = Named("link2.length", ("temp_link2",), "linear", None, "link-thermal-growth")
 

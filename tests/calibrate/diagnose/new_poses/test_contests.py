@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from calibrate.diagnose.doubts.findings import named
+from calibrate.diagnose.assess.findings import named
 from calibrate.diagnose.new_poses.contests import duel, rival_named
 from calibrate.diagnose.new_poses.longer_session import NewPoses, elsewhere
 from calibrate.diagnose.new_poses.next_poses import next_poses

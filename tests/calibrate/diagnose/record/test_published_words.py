@@ -5,8 +5,8 @@ import re
 import numpy as np
 import pytest
 
-from calibrate.diagnose.doubts.findings import named
-from calibrate.diagnose.doubts.pulled_back import picture_driver
+from calibrate.diagnose.assess.findings import named
+from calibrate.diagnose.assess.pulled_back import picture_driver
 from calibrate.diagnose.streams.continuity import Fault
 from calibrate.diagnose.streams.streams_of_recording import EXPLAINS, USUAL
 from calibrate.model.effects.catalogue import EFFECTS, missing_of, terms_of

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from calibrate.diagnose.doubts.unknown import with_unknowns
+from calibrate.diagnose.assess.unknown import with_unknowns
 from calibrate.diagnose.search import limits
 from calibrate.diagnose.search.bench import Bench
 from calibrate.diagnose.search.search import search

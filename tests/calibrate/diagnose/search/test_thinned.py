@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from calibrate.diagnose.doubts import limits
-from calibrate.diagnose.doubts.doubt import thinned
+from calibrate.diagnose.assess import limits
+from calibrate.diagnose.assess.assessment import thinned
 from tests.calibrate.diagnose.conftest import World
 
 SAMPLES = limits.MOST_ROWS // World().channels  # of so many rows each

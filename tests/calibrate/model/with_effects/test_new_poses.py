@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from calibrate.diagnose.doubts import limits
-from calibrate.diagnose.doubts.free_space_change import free_space_change
+from calibrate.diagnose.assess import limits
+from calibrate.diagnose.assess.free_space_change import free_space_change
 from calibrate.diagnose.new_poses.longer_session import NewPoses, elsewhere
 from calibrate.diagnose.state.fitted import fit_geometry
 from calibrate.diagnose.state.session import session_of

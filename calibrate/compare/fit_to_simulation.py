@@ -38,7 +38,7 @@ from calibrate.compare.corrected import (
     predictor_of,
     without_known,
 )
-from calibrate.diagnose.doubts import Named
+from calibrate.diagnose.assess import Named
 from calibrate.diagnose.from_recording import Diagnosed, diagnose_samples
 from calibrate.diagnose.search import Bench, sandwich
 from calibrate.diagnose.state import Assumed, Fitted, Session, fit_geometry

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from calibrate.diagnose.doubts.diagnosis import (
+from calibrate.diagnose.assess.diagnosis import (
     NOT_FINAL,
     UNKNOWN,
     Finding,

@@ -12,7 +12,7 @@ import pytest
 
 from acquisition.recording import read
 from calibeam.cli import run
-from calibrate.diagnose.doubts.findings import named
+from calibrate.diagnose.assess.findings import named
 from calibrate.diagnose.new_poses.contests import duel, rival_named
 from calibrate.diagnose.new_poses.longer_session import elsewhere
 from calibrate.diagnose.new_poses.next_poses import next_poses, reach_of

@@ -18,8 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import pdtrc
 
-from calibrate.diagnose.doubts import limits
-from calibrate.diagnose.doubts.diagnosis import (
+from calibrate.diagnose.assess import limits
+from calibrate.diagnose.assess.diagnosis import (
     NAMED,
     NOT_FINAL,
     PLACED,
@@ -28,8 +28,8 @@ from calibrate.diagnose.doubts.diagnosis import (
     Named,
     RivalName,
 )
-from calibrate.diagnose.doubts.pulled_back import pulled_back
-from calibrate.diagnose.doubts.rivals import Rival, confidences
+from calibrate.diagnose.assess.pulled_back import pulled_back
+from calibrate.diagnose.assess.rivals import Rival, confidences
 from calibrate.diagnose.search.bench import Bench
 from calibrate.diagnose.search.port_process import lever
 from calibrate.diagnose.search.score import (
@@ -67,7 +67,7 @@ def findings_of(
     untold: Collection[int] = (),
     weighed: bool = True,
 ) -> tuple[Finding, ...]:
-    """Largest first. `rivals` of each term; `predicts` (term,) as `calibrate/diagnose/doubts/doubt.py` gives it.
+    """Largest first. `rivals` of each term; `predicts` (term,) as `calibrate/diagnose/assess/assessment.py` gives it.
 
     All that is unknown at one port is one finding. `final`: no structure is left without a name; while some is, no
     name of physics is more likely than not. `untold`: terms that a column which was not recorded would explain; their
@@ -242,8 +242,8 @@ def _of_pose(driver: str) -> bool:
 def unknown_cause(at: Search, group: Sequence[int], predicts: Floats) -> Finding:
     """One finding for the accepted open terms `group`, all of one port, the largest one first in the picture.
 
-    `predicts` (term,) as `calibrate/diagnose/doubts/doubt.py` gives it. The share is a square, not divided by that of
-    all findings.
+    `predicts` (term,) as `calibrate/diagnose/assess/assessment.py` gives it. The share is a square, not divided by that
+    of all findings.
     """
     bench = at.bench
     gone = removed(bench.state, bench.sight, tuple(group))

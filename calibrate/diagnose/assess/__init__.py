@@ -2,10 +2,10 @@
 limits, and effects that these poses cannot separate.
 """
 
-from calibrate.diagnose.doubts.detection_limits import Isolability, Smallest, isolability, smallest_visible
-from calibrate.diagnose.doubts.diagnosis import Finding, Named, Verdict
-from calibrate.diagnose.doubts.findings import named
-from calibrate.diagnose.doubts.stated_noise import Statement
+from calibrate.diagnose.assess.detection_limits import Isolability, Smallest, isolability, smallest_visible
+from calibrate.diagnose.assess.diagnosis import Finding, Named, Verdict
+from calibrate.diagnose.assess.findings import named
+from calibrate.diagnose.assess.stated_noise import Statement
 
 __all__ = [
     "Finding",

@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
+from calibrate.diagnose.assess.assessment import predicts
+from calibrate.diagnose.assess.detection_limits import isolability
+from calibrate.diagnose.assess.diagnosis import NAMED, UNKNOWN, Verdict
+from calibrate.diagnose.assess.findings import findings_of
+from calibrate.diagnose.assess.lack_of_fit import lack_of_fit
+from calibrate.diagnose.assess.rivals import confidences, rivals_of
+from calibrate.diagnose.assess.unrecorded import unrecorded
 from calibrate.diagnose.diagnose import diagnose
-from calibrate.diagnose.doubts.detection_limits import isolability
-from calibrate.diagnose.doubts.diagnosis import NAMED, UNKNOWN, Verdict
-from calibrate.diagnose.doubts.doubt import predicts
-from calibrate.diagnose.doubts.findings import findings_of
-from calibrate.diagnose.doubts.lack_of_fit import lack_of_fit
-from calibrate.diagnose.doubts.rivals import confidences, rivals_of
-from calibrate.diagnose.doubts.unrecorded import unrecorded
 from calibrate.diagnose.new_poses.next_poses import Contest, Duel, next_poses
 from calibrate.diagnose.search.bench import Bench
 from calibrate.diagnose.search.line_search import refined
@@ -178,7 +178,7 @@ def test_no_confidence_exceeds_what_the_drawn_sessions_prove(world):
 def test_a_name_of_one_size_below_three_sigma_is_an_unknown_cause(world, monkeypatch, sizes, is_a_name):
     rng = np.random.default_rng(1)
     found = search(world.session(rng, [(world.at_joint(2, sine(2)), 2.0)]), rng)
-    monkeypatch.setattr("calibrate.diagnose.doubts.findings.sizes_of", lambda bench, i: sizes)
+    monkeypatch.setattr("calibrate.diagnose.assess.findings.sizes_of", lambda bench, i: sizes)
     (said,) = findings_of(found, [()], predicts(found.bench))
     assert (said.name.physics != UNKNOWN) is is_a_name
     assert said.confidence + sum(rival.confidence for rival in said.rivals) <= 1.0

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from calibrate.diagnose.doubts.doubt import with_best_names
-from calibrate.diagnose.doubts.findings import findings_of
-from calibrate.diagnose.doubts.rivals import Rival, confidences
+from calibrate.diagnose.assess.assessment import with_best_names
+from calibrate.diagnose.assess.findings import findings_of
+from calibrate.diagnose.assess.rivals import Rival, confidences
 from calibrate.diagnose.search.bench import Bench
 from calibrate.diagnose.search.line_search import refined
 from calibrate.diagnose.search.searching import Search

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from calibrate.diagnose.doubts import limits
+from calibrate.diagnose.assess import limits
 from calibrate.diagnose.search.bench import Bench
 from calibrate.diagnose.search.growing import proposals
 from calibrate.diagnose.search.score import Removed, gain_of, scores

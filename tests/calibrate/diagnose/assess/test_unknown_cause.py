@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from calibrate.diagnose.doubts.doubt import assessed, predicts
-from calibrate.diagnose.doubts.findings import findings_of, pieces
-from calibrate.diagnose.doubts.unknown import cancel, with_unknowns
+from calibrate.diagnose.assess.assessment import assessed, predicts
+from calibrate.diagnose.assess.findings import findings_of, pieces
+from calibrate.diagnose.assess.unknown import cancel, with_unknowns
 from calibrate.diagnose.search.bench import Bench
 from calibrate.diagnose.search.open_families import anything, fitted_curve, open_families
 from calibrate.diagnose.search.port_process import places_of, processes
@@ -163,7 +163,7 @@ def test_terms_taken_out_come_back_into_what_a_curve_may_explain(world):
 
 def test_unseen_errors_are_those_of_leaving_rows_out(world):
     """Against a refit without the fold."""
-    from calibrate.diagnose.doubts.doubt import _unseen_squares
+    from calibrate.diagnose.assess.assessment import _unseen_squares
 
     rng = np.random.default_rng(5)
     X, y = rng.normal(size=(60, 5)), rng.normal(size=60)
@@ -233,10 +233,10 @@ def weighed(joint):
 @pytest.fixture
 def without_masses(monkeypatch):
     """The linear sessions have no rig to compute a torque, its sigma or a payload's lever from."""
-    monkeypatch.setattr("calibrate.diagnose.doubts.doubt.unrecorded", lambda bench, rng, missing: None)
-    monkeypatch.setattr("calibrate.diagnose.doubts.findings.sizes_of", lambda bench, i: {})
+    monkeypatch.setattr("calibrate.diagnose.assess.assessment.unrecorded", lambda bench, rng, missing: None)
+    monkeypatch.setattr("calibrate.diagnose.assess.findings.sizes_of", lambda bench, i: {})
     monkeypatch.setattr(
-        "calibrate.diagnose.doubts.pulled_back.likely_torque_nm", lambda d, joint: d.extra[f"gravity_torque{joint}"]
+        "calibrate.diagnose.assess.pulled_back.likely_torque_nm", lambda d, joint: d.extra[f"gravity_torque{joint}"]
     )
 
 

@@ -15,8 +15,8 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
-from calibrate.diagnose.doubts import limits
-from calibrate.diagnose.doubts.joint_scatter import innocent
+from calibrate.diagnose.assess import limits
+from calibrate.diagnose.assess.joint_scatter import innocent
 from calibrate.diagnose.search.null import Tail
 from calibrate.diagnose.state.fitted import Fitted
 from calibrate.diagnose.state.linearised import UnseenMisfits, tame

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from calibrate.diagnose.doubts import limits
+from calibrate.diagnose.assess import limits
 from calibrate.diagnose.state.fitted import Fitted
 from calibrate.model.checks.rough_fit import rough_fit
 from calibrate.model.effects.drivers import Drivers

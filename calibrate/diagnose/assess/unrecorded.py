@@ -13,14 +13,14 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from calibrate.diagnose.doubts import limits
-from calibrate.diagnose.doubts.joint_scatter import (
+from calibrate.diagnose.assess import limits
+from calibrate.diagnose.assess.joint_scatter import (
     LOUDNESS,
     Innocent,
     innocent,
     spectrum,
 )
-from calibrate.diagnose.doubts.missing_columns import TIME, Wish, wishes
+from calibrate.diagnose.assess.missing_columns import TIME, Wish, wishes
 from calibrate.diagnose.search.bench import Bench
 from calibrate.diagnose.search.null import Tail
 from calibrate.diagnose.search.port_process import lever

@@ -19,9 +19,9 @@ from numpy.typing import NDArray
 from scipy.special import ndtri
 
 from calibrate.diagnose import limits as shared_limits
-from calibrate.diagnose.doubts import limits
-from calibrate.diagnose.doubts.diagnosis import Named
-from calibrate.diagnose.doubts.findings import NO_SIZE, named
+from calibrate.diagnose.assess import limits
+from calibrate.diagnose.assess.diagnosis import Named
+from calibrate.diagnose.assess.findings import NO_SIZE, named
 from calibrate.diagnose.search.bench import Bench
 from calibrate.diagnose.search.score import directions
 from calibrate.diagnose.state.visible import EntryBlock, Menu

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from calibrate.diagnose.doubts.diagnosis import Pulled
+from calibrate.diagnose.assess.diagnosis import Pulled
 from calibrate.diagnose.search.bench import Bench
 from calibrate.model.effects.curve import cause
 from calibrate.model.effects.drivers import Drivers

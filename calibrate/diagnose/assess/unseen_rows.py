@@ -12,7 +12,7 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from calibrate.diagnose.doubts import limits
+from calibrate.diagnose.assess import limits
 from calibrate.diagnose.state.linearised import State, UnseenMisfits, tame
 from calibrate.fit.held_out import Split, by_place, last_block
 from calibrate.model.effects.drivers import Drivers

@@ -4,13 +4,13 @@ from dataclasses import replace
 
 import pytest
 
-from calibrate.diagnose.doubts.diagnosis import (
+from calibrate.diagnose.assess.diagnosis import (
     NOT_FINAL,
     Finding,
     Named,
     RivalName,
 )
-from calibrate.diagnose.doubts.missing_columns import doubtful, suspects, untold
+from calibrate.diagnose.assess.missing_columns import doubtful, suspects, untold
 from calibrate.model.effects.term import Missing
 
 WARMTH = (Missing("temp", "temp_<where>_degC", "link-thermal-growth"),)

@@ -14,8 +14,8 @@ from numpy.random import Generator
 
 from acquisition.recording import Samples, read
 from acquisition.recording.rig import Rig
-from benchmarks.blundered import ROWS, WHOLE_FILE, Made, Mistake
 from benchmarks.healthy import INSTRUMENTS, Drawn
+from benchmarks.with_mistakes import ROWS, WHOLE_FILE, Made, Mistake
 from calibrate.errors import DataError
 from calibrate.fit.identify.identify import refuse_wrong_file, without_blunders
 from calibrate.model.arms.catalogue import arm_of

@@ -7,9 +7,9 @@ from enum import Enum
 import numpy as np
 from numpy.typing import NDArray
 
-from calibrate.diagnose.doubts.lack_of_fit import LackOfFit
-from calibrate.diagnose.doubts.stated_noise import NoiseFound
-from calibrate.diagnose.doubts.unseen_rows import Floor, HeldOutProof
+from calibrate.diagnose.assess.lack_of_fit import LackOfFit
+from calibrate.diagnose.assess.stated_noise import NoiseFound
+from calibrate.diagnose.assess.unseen_rows import Floor, HeldOutProof
 from calibrate.diagnose.stages import Incomplete
 from calibrate.diagnose.state.linearised import State
 from calibrate.model.effects.term import Missing, Size

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from calibrate.diagnose.doubts import limits
-from calibrate.diagnose.doubts.unseen_rows import blocks, regions, splits_of, units
+from calibrate.diagnose.assess import limits
+from calibrate.diagnose.assess.unseen_rows import blocks, regions, splits_of, units
 
 
 def random_split(world, samples):

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import fdtrc
 
-from calibrate.diagnose.doubts import limits
+from calibrate.diagnose.assess import limits
 from calibrate.diagnose.search.bench import Bench
 
 Floats = NDArray[np.float64]

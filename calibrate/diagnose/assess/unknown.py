@@ -12,7 +12,7 @@ from itertools import combinations
 
 import numpy as np
 
-from calibrate.diagnose.doubts import limits
+from calibrate.diagnose.assess import limits
 from calibrate.diagnose.limits import FEWEST_FOR_NAMES
 from calibrate.diagnose.search import limits as search_limits
 from calibrate.diagnose.search.bench import Bench

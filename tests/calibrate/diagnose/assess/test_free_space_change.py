@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from calibrate.diagnose.doubts.free_space_change import free_space_change
+from calibrate.diagnose.assess.free_space_change import free_space_change
 from calibrate.diagnose.search.bench import Bench
 from calibrate.diagnose.search.line_search import refined
 from calibrate.diagnose.state.fitted import fit_geometry

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from acquisition.recording import read
-from calibrate.diagnose.doubts import limits
-from calibrate.diagnose.doubts.diagnosis import Verdict
-from calibrate.diagnose.doubts.stated_noise import Statement, close_pairs, neighbours, noise_found
+from calibrate.diagnose.assess import limits
+from calibrate.diagnose.assess.diagnosis import Verdict
+from calibrate.diagnose.assess.stated_noise import Statement, close_pairs, neighbours, noise_found
 from calibrate.diagnose.from_recording import beyond_noise, diagnose_samples
 from calibrate.diagnose.state.fitted import fit_geometry
 from calibrate.diagnose.state.session import session_of

@@ -27,21 +27,21 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from calibrate.diagnose.doubts import limits
-from calibrate.diagnose.doubts.diagnosis import (
+from calibrate.diagnose.assess import limits
+from calibrate.diagnose.assess.diagnosis import (
     UNKNOWN,
     Finding,
     Unexplained,
     Verdict,
 )
-from calibrate.diagnose.doubts.findings import bare_findings, findings_of, named
-from calibrate.diagnose.doubts.lack_of_fit import LackOfFit, lack_of_fit
-from calibrate.diagnose.doubts.missing_columns import TIME, suspects
-from calibrate.diagnose.doubts.missing_columns import untold as drift_not_determined
-from calibrate.diagnose.doubts.rivals import Rival, price, rivals_of
-from calibrate.diagnose.doubts.unknown import with_unknowns
-from calibrate.diagnose.doubts.unrecorded import Unrecorded, unrecorded
-from calibrate.diagnose.doubts.unseen_rows import blocks, regions, units
+from calibrate.diagnose.assess.findings import bare_findings, findings_of, named
+from calibrate.diagnose.assess.lack_of_fit import LackOfFit, lack_of_fit
+from calibrate.diagnose.assess.missing_columns import TIME, suspects
+from calibrate.diagnose.assess.missing_columns import untold as drift_not_determined
+from calibrate.diagnose.assess.rivals import Rival, price, rivals_of
+from calibrate.diagnose.assess.unknown import with_unknowns
+from calibrate.diagnose.assess.unrecorded import Unrecorded, unrecorded
+from calibrate.diagnose.assess.unseen_rows import blocks, regions, units
 from calibrate.diagnose.search import limits as search_limits
 from calibrate.diagnose.search.bench import Bench
 from calibrate.diagnose.search.pruning import without

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from calibrate.diagnose.doubts import limits
-from calibrate.diagnose.doubts.joint_scatter import innocent
-from calibrate.diagnose.doubts.unrecorded import unrecorded
+from calibrate.diagnose.assess import limits
+from calibrate.diagnose.assess.joint_scatter import innocent
+from calibrate.diagnose.assess.unrecorded import unrecorded
 from calibrate.diagnose.search.bench import Bench
 from calibrate.diagnose.search.noise_law import noise_law
 from calibrate.model.effects.term import Missing
