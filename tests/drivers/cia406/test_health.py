@@ -193,7 +193,7 @@ def test_who_was_late_is_said(memory, monkeypatch):
 
     monkeypatch.setattr(memory.bus, "recv", late)
     # whose heartbeat was the last but one is late first, unless both had come within a SYNC
-    busy = r"encoder (1|2|1, 2) for 1.5 periods; this computer was busy for \d\.\d s, end other programs; else check its"
+    busy = r"encoder (1|2|1, 2) for 1.5 periods; this computer was busy for \d\.\d s, end other programs; else"
     with pytest.raises(DeviceStale, match=busy):
         read_for(memory, 10.0)
 
