@@ -56,7 +56,7 @@ def diagnose_command(
         Where to write the diagnosis.
     model_out
         Where to write the model: geometry fitted together with the physics found, which `calibeam predict` uses. A
-        model of the same readings that stands there is kept where the new one is not better on unseen rows.
+        model of the same rig file and readings that stands there is kept where the new one is no better on unseen rows.
     report
         Where to write the pages for a person; default: beside the diagnosis.
     plan_out

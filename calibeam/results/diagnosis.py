@@ -166,8 +166,18 @@ def no_better_with_physics(file: DiagnosisFile) -> str:
 
 
 def why_kept(path: Path, model: ModelFile, file: DiagnosisFile) -> str:
-    """Why the model at `path` is not replaced by that of a diagnosis: it is of the same readings, and not worse."""
-    if not path.exists() or read_model(path).readings_sha256 != model.readings_sha256:
+    """Why the model at `path` is not replaced by that of a diagnosis: it is of the same rig file and readings, and not
+    worse. What cannot be read as a model is replaced.
+    """
+    try:
+        there = read_model(path) if path.exists() else None
+    except DataError:
+        there = None
+    if there is None or (there.rig, there.readings_sha256, there.measured_sha256) != (
+        model.rig,
+        model.readings_sha256,
+        model.measured_sha256,
+    ):
         return ""
     return no_better_with_physics(file)
 

@@ -84,5 +84,8 @@ def test_a_model_of_the_same_readings_is_kept_where_the_new_one_is_no_better(out
     assert why_kept(out / "model.json", model, nothing_found)
     assert why_kept(out / "model.json", model, file) == ""
     assert why_kept(tmp_path / "model.json", model, nothing_found) == ""
-    of_others = msgspec.structs.replace(model, readings_sha256="0" * 64)
-    assert why_kept(out / "model.json", of_others, nothing_found) == ""
+    other_rig = msgspec.structs.replace(model.rig, sha256="0" * 64)
+    for other in ({"readings_sha256": "0" * 64}, {"measured_sha256": "0" * 64}, {"rig": other_rig}):
+        assert why_kept(out / "model.json", msgspec.structs.replace(model, **other), nothing_found) == ""
+    (tmp_path / "damaged.json").write_text("{")
+    assert why_kept(tmp_path / "damaged.json", model, nothing_found) == ""
