@@ -1,3 +1,3 @@
-"""A measuring arm that a person moves: what to put the probe on next (`plan`, `guide`), when it is still (`stillness`),
-what is a reading and whether it can be (`reading`), and the session that asks for one after the other (`session`).
+"""A measuring arm that a person moves: what to put the probe on next (`plan`), when it is still (`stillness`), what
+is a reading and whether it can be (`reading`), and the session that asks for one after the other (`session`).
 """

@@ -2,5 +2,5 @@
 
 Open first `run.run`. Recordings are found (`recordings`), those that changed are handed to workers (`engine`,
 `supervised`, `worker`), one row each comes back (`row`, `table`), and what all rows show together is worked out
-(`drift`, `summary`) and drawn (`figures`, `page`). A new column is a field of `row.Row`.
+(`drift`, `summary`) and drawn (`fleet_page`). A new column is a field of `row.Row`.
 """

@@ -71,7 +71,8 @@ def candidates_of(
 ) -> Candidates:
     """About `per_block` poses for each place and order. DataError for a rig without [fixture] or [device].
 
-    A hand-held arm has no design: what it is asked for comes from where its joints have been (guided/coverage.py).
+    A hand-held arm has no design: what it is asked for comes from where its joints have been (`Coverage`,
+    acquisition/guided/reading.py).
     """
     if rig.fixture is not None and rig.placements:
         return _before_detectors(rig, per_block, rng, progress)

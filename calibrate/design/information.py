@@ -111,7 +111,7 @@ class Information:
     parameters: tuple[Parameter, ...]  # the free ones
     rows: Floats  # (pose, k, param) of the candidates, whitened and scaled
     known: Floats  # (row, param) of known distances of the rig, whitened and scaled
-    by_target: Floats  # (row, param) of the target by the scaled unknowns (target.py)
+    by_target: Floats  # (row, param) of the target by the scaled unknowns (`target_of`)
     by_scale: Floats  # (param,) of the scale of the workspace, by the scaled unknowns
     target: str  # what the target is
     hidden: Floats  # (param, k) orthonormal directions that no candidate shows, whatever their number

@@ -2,7 +2,7 @@
 outlying rows, settled fits, change with time, new poses.
 
 A false alarm of a diagnosis is decided by
-- `ALPHA_FIRST`, `ALPHA_DRIFT` and `ALPHA_FURTHER` of `search/limits.py`: terms;
+- `ALPHA_FIRST` and `ALPHA_FURTHER` of `search/limits.py`: terms;
 - those under "False alarms" of `doubts/limits.py`: something unexplained, a room's temperature, repeats;
 - `TIME_ALPHA` and `RUN_ALPHA` here: change with time, runs of gross errors;
 - the levels at the top of `streams/limits.py`: recorded streams.

@@ -117,7 +117,7 @@ def _same(error: float, q: Floats, other: tuple[float, Floats]) -> bool:
 
 @dataclass(frozen=True)
 class Simulation:
-    """`wide` are poses all over the workspace, `drawn_at` those at which arms were drawn."""
+    """`wide_rad` are poses all over the workspace, `drawn_at_rad` those at which arms were drawn."""
 
     machine: Machine
     sources: tuple[ErrorSource, ...]

@@ -221,7 +221,8 @@ def _settled(before: AxisNoise, after: AxisNoise) -> bool:
     return max(abs(c) for c in change) < SETTLED
 
 
-UNLIKELY = 0.01  # chance of an arm of the prior: below, the arm is taken to be farther off (as in report/verdict.py)
+# chance of an arm of the prior: below, the arm is taken to be farther off (as in report/elements/verdict.py)
+UNLIKELY = 0.01
 SEEN = 0.5  # share of a prior variance that the data remove from a combination: below, it is not a witness
 MOST_ROWS = 200  # that are predicted with their full covariance, spread over all
 

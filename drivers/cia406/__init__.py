@@ -1,4 +1,4 @@
-"""Joint encoders on CANopen by CiA 406: objects and frames (`codec`), what a node is set to and how it is checked
-(`configuration`, `health`), counts to angles (`angle`), one reading of all nodes per SYNC (`cycle`), the device itself
+"""Joint encoders on CANopen by CiA 406: objects, frames and how counts become angles (`codec`), what a node is set to
+and how it is checked (`configuration`, `health`), one reading of all nodes per SYNC (`cycle`), the device itself
 (`device`).
 """

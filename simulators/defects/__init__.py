@@ -2,12 +2,11 @@
 
 A file holds the mechanisms of one place in the chain: encoder, drive, link, base, tool, fixture, detector, tracker, and
 `outside` for what no catalogue lists. A new mechanism is one class there, with the method of its place (`defect.py`
-lists the places), and one line in `mechanisms.MECHANISMS`, or in
-`mechanisms.GIVEN` where it has its numbers from a model only. Other folders import from here.
+lists the places), and one line in `mechanisms.MECHANISMS`, or in `mechanisms.GIVEN` where it has its numbers from a
+model only.
 """
 
-from simulators.arm.statics import Load
-from simulators.defects.defect import Defect, size_of, with_size
+from simulators.defects.defect import Defect
 from simulators.defects.mechanisms import GIVEN, MECHANISMS, RAISED, WrittenError, defects_of, written
 from simulators.defects.scene import Light, Scene, Site, UnsuitedError
 
@@ -17,13 +16,10 @@ __all__ = [
     "RAISED",
     "Defect",
     "Light",
-    "Load",
     "Scene",
     "Site",
     "UnsuitedError",
     "WrittenError",
     "defects_of",
-    "size_of",
-    "with_size",
     "written",
 ]

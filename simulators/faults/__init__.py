@@ -1,5 +1,5 @@
 """Trouble that is injected into devices and lines on request of the side channel.
 
-`fault` lists what there is, `injector` when it strikes, `line_faults` and `faulty_wire` what it does to the bytes. A
-new kind is a name in `fault` and its effect in `line_faults` or in the state of the device.
+`device_faults` lists what there is and what it does to devices and bytes, `injector` when it strikes and which line
+carries it. A new kind is a name in `device_faults`, and its effect there or in the state of the device.
 """

@@ -1,1 +1,1 @@
-"""The PSD box on its serial port: `daq` is the box, `frames` its protocol, `emulator` the bench."""
+"""The PSD box on its serial port: `emulator` is the box and its bench, `frames` the protocol."""

@@ -8,9 +8,9 @@ file; both name file, place, value and remedy. A new kind of file is a record of
 from acquisition.recording.errors import brief, cleaned, shown
 from acquisition.recording.files.explain import KeyPath, si_value
 from acquisition.recording.files.json_file import JsonKind, read_json, write_json
-from acquisition.recording.files.toml_file import TomlFile, parse_toml, read_text
+from acquisition.recording.files.toml_file import parse_toml, read_text
 
 __all__ = [
-    "JsonKind", "KeyPath", "TomlFile", "brief", "cleaned", "parse_toml", "read_json", "read_text", "shown", "si_value",
+    "JsonKind", "KeyPath", "brief", "cleaned", "parse_toml", "read_json", "read_text", "shown", "si_value",
     "write_json",
 ]  # fmt: skip

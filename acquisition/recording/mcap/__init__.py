@@ -1,26 +1,19 @@
 """The recording's file: MCAP with embedded protobuf descriptions, whole at any instant while it is written.
 
 `RecordingWriter` and `read` (both in `acquisition.recording`) are what most need. Here is the rest: long recordings in
-segments, sessions of several parts, the topics of a file for programs that read it without its records. A new kind of
-message is a `MessageType` in `layout`, an encoder in `write_thread` and a `_take_...` in `read`.
+segments, sessions of several parts. A new kind of message is a `MessageType` in `layout`, an encoder in `write_thread`
+and a `_take_...` in `read`.
 """
 
 import importlib
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from acquisition.recording.mcap.layout import EVENTS_TOPIC, GAPS_TOPIC, SAMPLES_TOPIC, VIEW_TOPIC
     from acquisition.recording.mcap.log_segments import Rotation, SegmentedRecording, SegmentStream, segments
-    from acquisition.recording.mcap.scan import Scan
     from acquisition.recording.mcap.session_parts import differs, next_part, parts
 
 __all__ = [
-    "EVENTS_TOPIC",
-    "GAPS_TOPIC",
-    "SAMPLES_TOPIC",
-    "VIEW_TOPIC",
     "Rotation",
-    "Scan",
     "SegmentStream",
     "SegmentedRecording",
     "differs",
@@ -30,9 +23,7 @@ __all__ = [
 ]
 
 _NAMES_IN = {
-    "layout": ("EVENTS_TOPIC", "GAPS_TOPIC", "SAMPLES_TOPIC", "VIEW_TOPIC"),
     "log_segments": ("Rotation", "SegmentStream", "SegmentedRecording", "segments"),
-    "scan": ("Scan",),
     "session_parts": ("differs", "next_part", "parts"),
 }
 _MODULE_OF = {name: module for module, names in _NAMES_IN.items() for name in names}

@@ -129,7 +129,9 @@ def _p_of(bench: Bench, proposed: Proposal, null: Null, coarse: float) -> float:
 
 
 def _alpha(at: Search, null: Null | None, slow: bool) -> float:
-    """Where noise wanders, a drift has the whole 5 %: the null overstates the wander, and false drifts are rarer."""
+    """Where noise wanders, a drift enters at a wider level, since the null overstates the wander; `confirmed` asks it
+    for the usual level in the end.
+    """
     if at.state.accepted:
         return limits.ALPHA_FURTHER
     return limits.ALPHA_DRIFT if slow and null is not None and null.law.wanders else limits.ALPHA_FIRST

@@ -84,7 +84,9 @@ class SpotsWitness:
         return Strain(median(distance), median(np.stack(moved, axis=-1)))
 
     def otherwise(self) -> Iterator[Otherwise]:
-        """Detectors exchanged in the order of the light, and millimetres. Mirrored axes: spot_signs.py."""
+        """Detectors exchanged in the order of the light, and millimetres. Mirrored axes: `mirrored_axes`
+        of fit/identify/clean.py.
+        """
         yield Otherwise(
             GrossErrorKind.EXCHANGED_PSD,
             "column first_psd",
