@@ -94,13 +94,13 @@ def run_coverage() -> None:
     print("\n".join(coverage.lines(coverage.run(RIG))))
 
 
-def run_beside_model(seeds: range | None = None) -> None:
+def run_with_known_model(seeds: range | None = None) -> None:
     print("beside a known model: its own recording, an unchanged later one, and one after a change drawn at random")
     for row in with_known_model.lines(seeds or range(with_known_model.FIRST_SEED, with_known_model.FIRST_SEED + 10)):
         print(row, flush=True)
 
 
-def run_blunders() -> None:
+def run_gross_errors() -> None:
     print("blunders put into sessions at random rows and joints, and healthy sessions of every instrument")
     for row in gross_errors.lines(RIG, RIG.parents[2] / "shared" / "data"):
         print(row, flush=True)
@@ -178,7 +178,7 @@ def run_fleet() -> None:
 
 def run_fleet_drift() -> None:
     print("fleets in which nothing drifts, or one zero does: what is said")
-    for row in (*fleet.false_drift_lines(), *fleet.told_drift_lines()):
+    for row in (*fleet.false_drift_lines(), *fleet.found_drift_lines()):
         print(row, flush=True)
 
 
@@ -262,8 +262,8 @@ BENCHMARKS: dict[str, Callable[[], None]] = {
     "inverse": run_inverse,
     "zeros": run_zeros,
     "coverage": run_coverage,
-    "beside_model": run_beside_model,
-    "blunders": run_blunders,
+    "beside_model": run_with_known_model,
+    "blunders": run_gross_errors,
     "speed": run_speed,
     "false_alarms": run_false_alarms,
     "fleet": run_fleet,
@@ -291,7 +291,7 @@ BENCHMARKS: dict[str, Callable[[], None]] = {
 
 
 SEEDED: dict[str, Callable[[range], None]] = {
-    "beside_model": run_beside_model,
+    "beside_model": run_with_known_model,
     "designed_poses": run_designed_poses,
     "measuring-arm": run_measuring_arm,
     "measuring-arm-bearings": run_perfect_bearings,

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from acquisition.centring.aim import BeamTarget, BelievedArm, FixtureOptics, flange_for, reach
+from acquisition.centring.aim import AssumedArm, BeamTarget, FixtureOptics, flange_for, reach
 from acquisition.centring.loop import Centring, CentringStatus, Limits, Strategy, centre
 from acquisition.centring.registered import FixedGuess, Registered
 from acquisition.centring.search import Found, Search
@@ -24,7 +24,7 @@ from calibeam.learner import FittedLearner
 from tests.support.direct_bench import DirectBench, direct_bench
 
 Floats = NDArray[np.float64]
-Make = Callable[[BelievedArm, FixtureOptics, Floats, int], Strategy]
+Make = Callable[[AssumedArm, FixtureOptics, Floats, int], Strategy]
 
 SESSIONS = "registered (sessions use it)"
 STRATEGIES: tuple[tuple[str, Make], ...] = (

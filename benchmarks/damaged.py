@@ -20,7 +20,7 @@ class Tally:
     """How readings of damaged copies ended."""
 
     whole: int = 0  # nothing missing, and nothing was said
-    told: int = 0  # damage told, the rest read
+    reported: int = 0  # damage told, the rest read
     refused: int = 0  # one clear error
     wrong: int = 0  # a value that was never recorded
     silent: int = 0  # something missing, and nothing said
@@ -87,7 +87,7 @@ def _tally(copies: Iterator[bytes], hurt: Path, intact: Recording) -> Tally:
         if not _right(recording, intact):
             tally.wrong += 1
         elif recording.damage or not recording.complete:
-            tally.told += 1
+            tally.reported += 1
         elif kept[-1] == 1.0:
             tally.whole += 1
         else:
@@ -130,7 +130,7 @@ def _right(recording: Recording, intact: Recording) -> bool:
 
 def _line(tally: Tally) -> str:
     return (
-        f"{tally.wrong} wrong values, {tally.silent} losses not told, {tally.other} other exceptions; {tally.told} "
+        f"{tally.wrong} wrong values, {tally.silent} losses not told, {tally.other} other exceptions; {tally.reported} "
         f"read with the damage told, {tally.refused} refused in one sentence, {tally.whole} unharmed; "
         f"{100.0 * tally.kept:.0f} % of the samples kept in the mean"
     )

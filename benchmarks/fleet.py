@@ -17,7 +17,7 @@ from calibeam.fleet.run import RunOptions, run
 
 FILES = (12, 24, 48)
 SAMPLES = 40  # the least that is still identified: what is measured is the spreading
-TOLD = 1.1  # exponent that a run may have
+MOST_EXPONENT = 1.1  # exponent that a run may have
 FLEETS = 1000
 
 
@@ -39,8 +39,8 @@ def lines(folder: Path, files: Sequence[int] = FILES) -> Iterator[str]:
         start = seconds[0] - rate * counts[0]
         yield f"{name}: {rate:.2f} s a file, {rate / first:.2f} times loky with 2; start {start:.1f} s"
         exponent = float(np.polyfit(np.log(counts), np.log(seconds), 1)[0])
-        reached = "reached" if exponent <= TOLD else "NOT reached"
-        yield f"{name}: exponent of time over files {exponent:.2f} (wanted <= {TOLD}: {reached})"
+        reached = "reached" if exponent <= MOST_EXPONENT else "NOT reached"
+        yield f"{name}: exponent of time over files {exponent:.2f} (wanted <= {MOST_EXPONENT}: {reached})"
 
 
 def _timed(folder: Path, count: int, workers: Workers) -> float:
@@ -71,7 +71,7 @@ def false_drift_lines() -> Iterator[str]:
         yield f"{name}: a drift is said in {said} of {FLEETS} fleets without one (wanted <= {FAMILY:.0%})"
 
 
-def told_drift_lines() -> Iterator[str]:
+def found_drift_lines() -> Iterator[str]:
     """Of 20 zeros on four dates one drifts: how often it is said, by its size."""
     for ratio in (3.0, 4.0, 5.0, 6.0, 8.0):
         rng, said = np.random.default_rng(2), 0

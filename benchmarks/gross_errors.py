@@ -17,7 +17,7 @@ from acquisition.recording.rig import Rig
 from benchmarks.healthy import INSTRUMENTS, Drawn
 from benchmarks.with_mistakes import ROWS, WHOLE_FILE, Made, Mistake
 from calibrate.errors import DataError
-from calibrate.fit.identify.identify import refuse_wrong_file, without_blunders
+from calibrate.fit.identify.identify import refuse_wrong_file, without_gross_errors
 from calibrate.model.arms.catalogue import arm_of
 from calibrate.model.checks.witness import Strain
 from calibrate.model.parameters import start_values
@@ -50,7 +50,7 @@ def sources(rig_file: Path, real: Path) -> dict[str, Draw]:
 
 def false_alarms(draw: Draw, sessions: int, seed: int = 7_000) -> list[str]:
     """What was said of healthy sessions."""
-    said = (told(*draw(np.random.default_rng(seed + i)), rows=True)[0] for i in range(sessions))
+    said = (outcome_of(*draw(np.random.default_rng(seed + i)), rows=True)[0] for i in range(sessions))
     return [text for text in said if text]
 
 
@@ -66,20 +66,20 @@ def counts(draw: Draw, mistakes: tuple[Mistake, ...], sessions: int, seed: int =
     return out
 
 
-def told(rig: Rig, samples: Samples, *, rows: bool) -> tuple[str, frozenset[int]]:
+def outcome_of(rig: Rig, samples: Samples, *, rows: bool) -> tuple[str, frozenset[int]]:
     """All that is said of a file, and the rows (from 0) it is said of; `rows` False: of the whole file only."""
     try:
         if not rows:
             refuse_wrong_file(rig, samples)
             return "", frozenset()
-        found = without_blunders(rig, samples)[2]
+        found = without_gross_errors(rig, samples)[2]
     except DataError as error:
         return str(error), frozenset()
     return "; ".join(b.says for b in found), frozenset(row for b in found for row in b.rows)
 
 
 def _judge(count: Count, rig: Rig, healthy: Samples, made: Made) -> None:
-    said, rows = told(rig, made.samples, rows=bool(made.rows))
+    said, rows = outcome_of(rig, made.samples, rows=bool(made.rows))
     alone = made.parts or (made.samples,) * len(made.names)
     if all(name in said for name in made.names) and rows == frozenset(made.rows):
         count.found += 1

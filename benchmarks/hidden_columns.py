@@ -119,10 +119,10 @@ def hidden_angles(recording: Recording) -> tuple[HiddenAngle, ...]:
     state = fit_geometry(session_of(recording.rig, recording.samples))
     samples = np.unique(state.rows.sample[state.rows.data])
     test = splits_of(state.drivers, samples, np.random.default_rng(SEED))[0].unseen[0]
-    told = np.setdiff1d(samples, test)
-    tried = splits_of(state.drivers, told, np.random.default_rng(SEED))[0].unseen[0]
-    misfit = _misfit(state.select(np.setdiff1d(told, tried)).refitted(()), tried)
-    known = state.select(told).refitted(())
+    known_rows = np.setdiff1d(samples, test)
+    tried = splits_of(state.drivers, known_rows, np.random.default_rng(SEED))[0].unseen[0]
+    misfit = _misfit(state.select(np.setdiff1d(known_rows, tried)).refitted(()), tried)
+    known = state.select(known_rows).refitted(())
     return tuple(_hidden(known, test, joint, misfit) for joint in range(known.session.arm.n_joints))
 
 
@@ -267,7 +267,7 @@ LEAD = (
 )
 HEAD = ("", "samples", "unseen samples, geometry", "with what was found", "noise, as it is known", "found")
 ANGLES = ("hidden", "poses", "inferred less recorded, rms", "uncertainty stated before", "poses that do not feel it")
-DOUBT = 2.0  # sigmas that the figure shades
+SHADED_SIGMAS = 2.0  # sigmas that the figure shades
 MOST = 6.0  # sigmas that it shows
 
 
@@ -334,7 +334,7 @@ def _angles(one: RealScore) -> list[Html]:
 
 def _paint(figure: Figure, angles: Sequence[HiddenAngle]) -> None:
     axes = figure.subplots()
-    axes.axhspan(-DOUBT, DOUBT, color=Tone.FAINT.value)
+    axes.axhspan(-SHADED_SIGMAS, SHADED_SIGMAS, color=Tone.FAINT.value)
     for hidden in angles:
         n = len(hidden.misses)
         across = [hidden.joint + 0.7 * ((i + 0.5) / n - 0.5) for i in range(n)]

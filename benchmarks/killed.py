@@ -85,5 +85,5 @@ def _killed(rig: Path, path: Path, after_s: float) -> tuple[float, int]:
                 end_s = time.monotonic() + after_s
         child.send_signal(signal.SIGKILL)
         said += child.stdout.read()
-    told = np.frombuffer(said[: len(said) // 16 * 16], dtype="<f8").reshape(-1, 2)
-    return float(told[-1, 0]), int(told[-1, 1])
+    received = np.frombuffer(said[: len(said) // 16 * 16], dtype="<f8").reshape(-1, 2)
+    return float(received[-1, 0]), int(received[-1, 1])

@@ -30,10 +30,10 @@ WANDER_HZ = np.array([0.11, 0.17, 0.13, 0.19, 0.23, 0.07])
 
 def lit_posture(rig: Rig, placement: int = 1, first: int = 1) -> Floats:
     """Joint readings whose beam strikes the middle of both faces."""
-    believed = AssumedRig(rig)
+    assumed = AssumedRig(rig)
     middle = BeamTarget(first, (0.0, 0.0, 0.0, 0.0), BEFORE_M, 0.0)
-    flange = flange_for(believed.arm, believed.fixture, believed.T_base_psd1(placement), middle)
-    return reach(believed.arm, flange, np.array(rig.motion.home_rad), np.random.default_rng(1))
+    flange = flange_for(assumed.arm, assumed.fixture, assumed.T_base_psd1(placement), middle)
+    return reach(assumed.arm, flange, np.array(rig.motion.home_rad), np.random.default_rng(1))
 
 
 @dataclass
@@ -52,7 +52,7 @@ class LivingRig:
     def __post_init__(self) -> None:
         assert self.rig.fixture is not None
         self._half_m = self.rig.fixture.half_size_m
-        self._believed = AssumedRig(self.rig)
+        self._assumed = AssumedRig(self.rig)
         self._middle_rad = lit_posture(self.rig, self.placement)
         self._next = dict.fromkeys(RATES_HZ, 0)
         self._rng = np.random.default_rng(2)
@@ -80,7 +80,7 @@ class LivingRig:
         return {name: q_rad + self._rng.normal(0.0, 3e-6, (count, self.rig.n_joints))}
 
     def _psd(self, q_rad: Floats, count: int) -> dict[str, NDArray[np.generic]]:
-        spots_m = self._believed.expect(q_rad, self.placement, 1).spots_m + np.array([6e-4, -4e-4, -3e-4, 8e-4])
+        spots_m = self._assumed.expect(q_rad, self.placement, 1).spots_m + np.array([6e-4, -4e-4, -3e-4, 8e-4])
         share = np.clip(spots_m / self._half_m, -1.0, 1.0)
         ends = 0.5 * SUM_A * np.stack([1.0 - share, 1.0 + share], axis=1).reshape(-1)
         lit = np.repeat([0.0 if face in self.dark else 1.0 for face in (1, 2)], 4)

@@ -25,7 +25,7 @@ from acquisition.recording.rig import Rig, load_rig, plain_rig, rig_sha256, rig_
 from benchmarks.direct_hand import COUNTS, DirectHand
 from benchmarks.slices import Slices
 from calibeam.guided.judge import FittedJudge, samples_of
-from calibeam.guided.recorded import BelievedGuidedArm
+from calibeam.guided.recorded import AssumedGuidedArm
 from calibrate.fit.identify.identify import identify
 from calibrate.fit.identify.record import record_of
 from calibrate.fit.identify.result import Identification
@@ -93,7 +93,7 @@ def run(rig_path: Path, seeds: range, options: GuidedOptions | None = None, **em
 
 
 def _one(rig: Rig, text: str, plain: Mapping[str, Any], seed: int, options: GuidedOptions) -> Outcome:
-    hand, arm = DirectHand(HandWorld.from_rig(plain, seed=seed), PERIOD_S), BelievedGuidedArm.of_rig(rig)
+    hand, arm = DirectHand(HandWorld.from_rig(plain, seed=seed), PERIOD_S), AssumedGuidedArm.of_rig(rig)
     rng = np.random.default_rng([seed, 8])
     session = GuidedSession(hand, arm, hand, FittedJudge(rig), Nobody(), rng, patience_s=PATIENCE_S)
     summary = session.run(calibration_plan(rig, options))
@@ -103,10 +103,10 @@ def _one(rig: Rig, text: str, plain: Mapping[str, Any], seed: int, options: Guid
     before_m = _rms(_squares(arm.tip_m(fresh.reading_rad), fresh)[0])
     pairs = list(zip(_squares(predictor.tip_m(fresh.reading_rad), fresh), _squares(fresh.floor_m, fresh), strict=True))
     names = [f"{kind}{what}_m" for kind in ("point", "repeat", "length") for what in ("", "_floor")]
-    told = dict(zip(names, (_rms(square) for pair in pairs for square in pair), strict=True))
+    errors = dict(zip(names, (_rms(square) for pair in pairs for square in pair), strict=True))
     point, repeat, length = (_ratio_sigma(*pair) for pair in pairs)
     sigmas = (point, repeat, length)
-    return Outcome(seed, len(summary.readings), summary.slips, before_m=before_m, **told, sigmas=sigmas)
+    return Outcome(seed, len(summary.readings), summary.slips, before_m=before_m, **errors, sigmas=sigmas)
 
 
 def identified(rig: Rig, readings: tuple[Reading, ...]) -> Identification:

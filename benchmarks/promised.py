@@ -84,10 +84,10 @@ def promises(arm: str, seed: int, targets: int, placed_m: float | None) -> Itera
         if ended not in (0, 3):
             return
         model = read_model(path)
-    believed = case.drawn.believed.arm
-    q_rad = free_poses(believed, POSES, np.random.default_rng(5))
-    T = forward(believed, q_rad + believed.zero_rad).flange
-    point_m = np.array(case.drawn.believed.tool_point_m)
+    nominal = case.drawn.nominal.arm
+    q_rad = free_poses(nominal, POSES, np.random.default_rng(5))
+    T = forward(nominal, q_rad + nominal.zero_rad).flange
+    point_m = np.array(case.drawn.nominal.tool_point_m)
     across = np.cross(point_m, [0.3, 0.9, 0.1])
     torch = np.eye(4)
     torch[:3, 3] = point_m + TORCH_M * across / np.linalg.norm(across)
@@ -124,7 +124,7 @@ def _motion(case: Case, model: ModelFile, q_rad: Floats) -> Floats:
     known = placed(model, as_samples(q_rad, {"payload_kg": np.zeros(len(q_rad))}))
     there_m = Predictor.of(model).measured_at(known.T_base_flange)
     points_m = np.atleast_2d(case.drawn.true.tool_point_m)  # of each row, where targets are several
-    first = np.argmin(np.linalg.norm(points_m - np.array(case.drawn.believed.tool_point_m), axis=1))
+    first = np.argmin(np.linalg.norm(points_m - np.array(case.drawn.nominal.tool_point_m), axis=1))
     return rigid_motion(there_m, true_tips_m(case, q_rad, points_m[first]))
 
 

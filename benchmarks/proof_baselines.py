@@ -77,7 +77,7 @@ TREES = 150
 DEPTH = 3  # interactions of three features, as is usual
 RATE = 0.05
 ROWS = 0.7  # of the samples, for each tree
-TOLD = 3  # features
+SHOWN = 3  # features
 
 
 class GradientBoosting:
@@ -99,7 +99,7 @@ class GradientBoosting:
             ).fit(X, channel)
             columns.append(trees.predict(unseen))
             weight += trees.feature_importances_
-        top = ", ".join(names[i] for i in np.argsort(-weight)[:TOLD])
+        top = ", ".join(names[i] for i in np.argsort(-weight)[:SHOWN])
         return Learnt(np.stack(columns, axis=1), f"most used: {top}; no place")
 
 
@@ -149,7 +149,7 @@ class SparseRegression:
         ]
         found = _fitted(library, y, THRESHOLDS[int(np.argmin(misses))])
         size = np.sum(np.abs(found), axis=1)
-        top = ", ".join(words[i] for i in np.argsort(-size)[:TOLD] if size[i] > 0.0)
+        top = ", ".join(words[i] for i in np.argsort(-size)[:SHOWN] if size[i] > 0.0)
         terms = int(np.sum(size > 0.0))
         says = "nothing" if terms == 0 else f"{terms} terms, largest: {top}; no place"
         return Learnt(_library(unseen, names)[0] @ found, says)

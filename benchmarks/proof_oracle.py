@@ -64,7 +64,7 @@ Ints = NDArray[np.intp]
 
 MOST_OF_ONE = 3  # terms for one mechanism
 PAYS = 10.0  # of BIC, for a further term of the same mechanism
-WILD = 6.0  # sigmas: rows that every method leaves out alike
+OUTLIER_SIGMAS = 6.0  # sigmas: rows that every method leaves out alike
 LENGTHS = 3  # components of a reading that are lengths
 
 
@@ -139,17 +139,17 @@ def _is_said(term: Term, finding: FindingRecord) -> bool:
     return (name.where, ",".join(name.depends_on), name.shape, name.order, name.physics) == said
 
 
-def misfit_m(unseen: Sequence[UnseenMisfits], wild: NDArray[np.bool_] | None = None) -> Floats:
+def misfit_m(unseen: Sequence[UnseenMisfits], outlying: NDArray[np.bool_] | None = None) -> Floats:
     """(reading,) lengths that a model misses on unseen samples, wild ones left out."""
     lengths = [u.misfit for u in unseen if u.instrument != ENCODER_DIFFERENCE]
     parts = [misfit[:, :LENGTHS] if misfit.shape[1] > 4 else misfit for misfit in lengths]
     flat = np.concatenate([p.ravel() for p in parts])
-    return flat if wild is None else flat[~wild]
+    return flat if outlying is None else flat[~outlying]
 
 
-def wild_of(misfit: Floats) -> NDArray[np.bool_]:
+def outlying_of(misfit: Floats) -> NDArray[np.bool_]:
     """(reading,) by the spread of the best model, for all methods alike."""
-    return np.abs(misfit) > WILD * sigma_about_zero(misfit)
+    return np.abs(misfit) > OUTLIER_SIGMAS * sigma_about_zero(misfit)
 
 
 def rms_m(misfit: Floats) -> float:
@@ -193,9 +193,9 @@ def compare(recording: Path, answer: Path, asked: Path, truth: Truth, family: st
     fold = fold_of(state, SEED)
     plain = fold.geometry.held_out(fold.test)
     known = state.select(fold.train).refitted(terms).held_out(fold.test)
-    wild = wild_of(misfit_m(known))
-    before_m, oracle_m = rms_m(misfit_m(plain, wild)), rms_m(misfit_m(known, wild))
-    rest = _Rest(fold, plain, wild, before_m, oracle_m)
+    outlying = outlying_of(misfit_m(known))
+    before_m, oracle_m = rms_m(misfit_m(plain, outlying)), rms_m(misfit_m(known, outlying))
+    rest = _Rest(fold, plain, outlying, before_m, oracle_m)
     scores = [BaselineScore(GEOMETRY, before_m, _gain(before_m, before_m, oracle_m), "no place and no cause")]
     scores += [_rival(m, rest) for m in installed()]
     scores += _diagnosed(state, read_diagnosis(answer / "diagnosis.json"), rest)
@@ -209,12 +209,12 @@ class _Rest:
 
     fold: Fold
     plain: tuple[UnseenMisfits, ...]  # misses of geometry alone
-    wild: NDArray[np.bool_]
+    outlying: NDArray[np.bool_]
     before_m: float
     oracle_m: float
 
     def score(self, method: str, left: Sequence[UnseenMisfits], says: str) -> BaselineScore:
-        rms = rms_m(misfit_m(left, self.wild))
+        rms = rms_m(misfit_m(left, self.outlying))
         return BaselineScore(method, rms, _gain(rms, self.before_m, self.oracle_m), says)
 
 

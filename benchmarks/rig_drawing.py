@@ -43,8 +43,8 @@ def _section(axes: Axes, rig: Rig) -> None:
     for number, centre, along in ((1, np.zeros(2), np.array([1.0, 0.0])), (2, second_mm, turned[1:, 1])):
         ends = np.array([centre - half_mm * along, centre + half_mm * along])
         axes.plot(*ends.T, color=FACE, linewidth=5.0, solid_capstyle="butt")
-        beside = np.array([0.0, -9.0]) if number == 1 else np.array([0.0, 15.0])
-        axes.annotate(f"PSD {number}, face {2 * half_mm:.0f} × {2 * half_mm:.0f} mm", _at(centre + beside), ha="center")
+        shift = np.array([0.0, -9.0]) if number == 1 else np.array([0.0, 15.0])
+        axes.annotate(f"PSD {number}, face {2 * half_mm:.0f} × {2 * half_mm:.0f} mm", _at(centre + shift), ha="center")
     distance_mm = float(np.hypot(*second_mm))
     to_second = second_mm / distance_mm
     incoming = np.array([-to_second[0], to_second[1]])

@@ -123,10 +123,10 @@ def lines(rig_file: Path, names: tuple[str, ...] = tuple(CASES)) -> Iterator[str
     """What was done, and what is said."""
     for name in names:
         yield f"{name}:"
-        yield from told(diagnosed(rig_file, CASES[name])[1])
+        yield from lines_of(diagnosed(rig_file, CASES[name])[1])
 
 
-def told(file: DiagnosisFile) -> Iterator[str]:
+def lines_of(file: DiagnosisFile) -> Iterator[str]:
     """Findings, what is usual and what cannot be seen, indented."""
     for one in file.findings:
         found = "in the samples" if one.stream is None else "found"

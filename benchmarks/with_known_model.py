@@ -77,7 +77,7 @@ def run_cases(seeds: Sequence[int], families: Sequence[Family] = FAMILIES) -> It
 
 def _case(folder: Path, family: Family, seed: int, defects: tuple[str, ...]) -> Answer:
     pair = Pair(folder, family=family, seed=seed, defects=defects, enr=ENR)
-    own = _names(_beside(pair, pair.folder / "recording"))
+    own = _names(_with_model(pair, pair.folder / "recording"))
     hidden = ", ".join(type(h.defect).__name__ for h in pair.case.hidden) or "nothing"
     again = any(effect.holds == "session" for effect in read_model(pair.model).effects)
     return Answer(family, seed, hidden, own, None if again else _later(pair, np.random.default_rng([seed, 16])))
@@ -86,7 +86,7 @@ def _case(folder: Path, family: Family, seed: int, defects: tuple[str, ...]) -> 
 def _later(pair: Pair, rng: np.random.Generator) -> Changed:
     kind = str(rng.choice(CHANGES[pair.case.wanted.family]))
     wanted = drawn_change(kind, pair, rng)
-    still, found = _beside(pair, pair.later("unchanged")), _beside(pair, pair.later("changed", wanted.change))
+    still, found = _with_model(pair, pair.later("unchanged")), _with_model(pair, pair.later("changed", wanted.change))
     names, by = [f.physics for f in found.findings], {c.parameter: c for c in found.changed}
     sigmas = [abs(by[name].by - true) / by[name].sigma for name, true in wanted.true.items() if name in by]
     if names != ([wanted.physics] if wanted.physics else []):
@@ -128,7 +128,7 @@ def drawn_change(kind: str, pair: Pair, rng: np.random.Generator) -> Wanted:
     names = [f"placement{k}.{what}_{axis}_{unit}" for what, unit in (("shift", "m"), ("turn", "rad")) for axis in "xyz"]
     if kind == "station":
         return Wanted(place(k, shift_m), "fixture-moved", dict(zip(names, (*shift_m, 0.0, 0.0, 0.0), strict=True)))
-    about_m = pair.case.drawn.believed.instrument.places[k - 1][:3, 3]  # type: ignore[union-attr]
+    about_m = pair.case.drawn.nominal.instrument.places[k - 1][:3, 3]  # type: ignore[union-attr]
     turned = place(k, np.zeros(3), turn_rad, about_m)
     return Wanted(turned, "fixture-moved", dict(zip(names, (0.0, 0.0, 0.0, *turn_rad), strict=True)))
 
@@ -140,12 +140,12 @@ def _by_axis(name: str, axes: str, values: np.ndarray) -> dict[str, float]:
 def _laser_numbers(pair: Pair, change: Change) -> dict[str, float]:
     """Change of the four numbers of the laser's line."""
     drawn = pair.case.drawn
-    before, after = (laser_line(drawn.believed.instrument, r.instrument) for r in (drawn.true, change(drawn.true)))
+    before, after = (laser_line(drawn.nominal.instrument, r.instrument) for r in (drawn.true, change(drawn.true)))
     names = ("laser.shift_u", "laser.shift_v", "laser.tilt_u", "laser.tilt_v")
     return dict(zip(names, (after - before).tolist(), strict=True))
 
 
-def _beside(pair: Pair, recording: Path) -> DiagnosisFile:
+def _with_model(pair: Pair, recording: Path) -> DiagnosisFile:
     """diagnosis.json of a recording beside the model of the pair, through the command."""
     out = recording.with_suffix(".json")
     run(["diagnose", str(recording), "--model", str(pair.model), "--out", str(out)])

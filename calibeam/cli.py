@@ -25,7 +25,7 @@ from simulators.conceal.wanted import ConcealError
 from simulators.errors import HostError, WorldError
 
 # Reported in one sentence instead of a traceback: everything that is about the user's world, not about our code.
-TOLD = (
+REPORTED = (
     AcquisitionError,
     BrokenSealError,
     CheckFailed,
@@ -92,7 +92,7 @@ def _run(arguments: list[str]) -> int:
     except KeyboardInterrupt as interrupt:
         errors.print(f"stopped by {interruption(interrupt)}")
         return 1
-    except TOLD as error:
+    except REPORTED as error:
         errors.print("error:", brief(str(error)), markup=False)
         return 1
     except ModuleNotFoundError as missing:

@@ -21,7 +21,7 @@ Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Beliefs:
+class PriorSigmas:
     """One sigma of what may be wrong before anything was measured."""
 
     zero_rad: float = 0.02  # a zero within 2 deg
@@ -46,36 +46,36 @@ class Beliefs:
 class FittedLearner:
     """Implements acquisition.session.records.Learner on the models of `calibrate`."""
 
-    def __init__(self, rig: Rig, beliefs: Beliefs | None = None) -> None:
-        self._rig, self._beliefs = rig, beliefs or Beliefs()
+    def __init__(self, rig: Rig, priors: PriorSigmas | None = None) -> None:
+        self._rig, self._priors = rig, priors or PriorSigmas()
         self._corrections: dict[str, float] = {}
-        self._believed = AssumedRig(rig)
+        self._assumed = AssumedRig(rig)
 
     @property
     def arm(self) -> AssumedArm:
-        return self._believed.arm
+        return self._assumed.arm
 
     @property
     def optics(self) -> AssumedFixture:
-        return self._believed.fixture
+        return self._assumed.fixture
 
     def T_base_fixture(self, placement: int) -> Floats:
-        return self._believed.T_base_psd1(placement)
+        return self._assumed.T_base_psd1(placement)
 
     def learn(self, samples: list[Sample]) -> None:
         if not samples:
             return
         placement = np.array([s.placement for s in samples], dtype=np.int64)
         chain = dual_psd_chain(self._rig, placement, np.array([s.first for s in samples], dtype=np.int64))
-        parameters = tuple(self._believed_to(p) for p in chain.parameters)
-        whitener = np.broadcast_to(np.eye(4) / self._beliefs.links_m, (len(samples), 4, 4))
+        parameters = tuple(self._with_prior(p) for p in chain.parameters)
+        whitener = np.broadcast_to(np.eye(4) / self._priors.links_m, (len(samples), 4, 4))
         spots_m = np.array([s.look.spots_m() for s in samples])
         problem = Problem(chain, parameters, np.array([s.look.q_rad for s in samples]), spots_m, whitener)
         start = np.array([self._corrections.get(p.name, p.start) for p in parameters])
         fit = solve(problem, start=start, max_steps=30)
         self._corrections = {p.name: float(v) for p, v in zip(parameters, fit.theta, strict=True)}
-        self._believed = AssumedRig(self._rig, self._corrections)
+        self._assumed = AssumedRig(self._rig, self._corrections)
 
-    def _believed_to(self, parameter: Parameter) -> Parameter:
-        sigma = self._beliefs.of(parameter)
+    def _with_prior(self, parameter: Parameter) -> Parameter:
+        sigma = self._priors.of(parameter)
         return replace(parameter, free=False) if sigma is None else replace(parameter, free=True, prior=sigma)

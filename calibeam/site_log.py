@@ -134,7 +134,7 @@ _ASKED = Annotated[LogLevel, Parameter(help="Of the log beside the recording: li
 LEVEL = inspect.Parameter("log_level", inspect.Parameter.KEYWORD_ONLY, default="info", annotation=_ASKED)
 
 
-def beside(recording: Path) -> Path:
+def site_log_of(recording: Path) -> Path:
     """Where the log of a single recording stands: r.log beside r.mcap."""
     path = recording.with_suffix(".log")
     return path if path != recording else recording.with_name(f"{recording.name}.log")

@@ -72,17 +72,17 @@ def stated(value_m: float) -> str:
     return f"{value_m / size:.6g}{TIED}{name}"
 
 
-def doubted_length(value_m: float, sigma_m: float) -> str:
+def length_with_sigma(value_m: float, sigma_m: float) -> str:
     """A length with its uncertainty in one unit: '136 ± 17 nm'."""
-    return _doubted(value_m, sigma_m, LENGTHS)
+    return _with_sigma(value_m, sigma_m, LENGTHS)
 
 
-def doubted_angle(value_rad: float, sigma_rad: float) -> str:
+def angle_with_sigma(value_rad: float, sigma_rad: float) -> str:
     """An angle with its uncertainty in one unit: '3.12 ± 0.16 µrad'."""
-    return _doubted(value_rad, sigma_rad, ANGLES)
+    return _with_sigma(value_rad, sigma_rad, ANGLES)
 
 
-def _doubted(value: float, sigma: float, units: Sequence[tuple[float, str]]) -> str:
+def _with_sigma(value: float, sigma: float, units: Sequence[tuple[float, str]]) -> str:
     size, name = _fitting(value, units)
     decimals = decimals_of(sigma / size)
     return f"{fixed(value / size, decimals)}{TIED}±{TIED}{fixed(sigma / size, decimals)}{TIED}{name}"

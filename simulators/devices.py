@@ -117,11 +117,11 @@ def without_links(devices: EmulatedDevices) -> EmulatedDevices:
         robot=unlinked(devices.robot),
         camera=camera,
         tracker=_anywhere(unlinked(devices.tracker)),
-        others={name: _elsewhere(bench) for name, bench in devices.others.items()},
+        others={name: _without_psd(bench) for name, bench in devices.others.items()},
     )
 
 
-def _elsewhere(bench: Bench) -> Bench:
+def _without_psd(bench: Bench) -> Bench:
     """On ports that only the announcement names."""
     ports = [
         replace(port, link=None)

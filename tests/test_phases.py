@@ -59,9 +59,9 @@ def test_no_test_falls_between_the_phases(request):
     assert "wired and not endure" in sessions
     ignored = {word.removeprefix("--ignore=") for word in sessions if word.startswith("--ignore=")}
     for path in (Path("tests") / name for name in conftest.WIRED):
-        beside_others = any(path.is_relative_to(word) for word in devices if word.startswith("tests/"))
+        with_others = any(path.is_relative_to(word) for word in devices if word.startswith("tests/"))
         alone = path.is_relative_to("tests/calibeam") and not any(path.is_relative_to(word) for word in ignored)
-        assert beside_others is not alone, path
+        assert with_others is not alone, path
 
 
 @pytest.mark.parametrize(

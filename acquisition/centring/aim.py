@@ -22,7 +22,7 @@ from acquisition.motion.kinematics import Kinematics, flange
 Floats = NDArray[np.float64]
 
 
-class BelievedArm(Kinematics, Protocol):
+class AssumedArm(Kinematics, Protocol):
     """The arm with its laser as known now. `q_rad` (joint,) are the controller's readings."""
 
     def beam(self, q_rad: Floats) -> tuple[Floats, Floats]:
@@ -58,20 +58,20 @@ def in_fixture(T_base_fixture: Floats, origin_m: Floats, direction: Floats) -> t
     return R.T @ (origin_m - T_base_fixture[:3, 3]), R.T @ direction
 
 
-def spots_at(arm: BelievedArm, optics: FixtureOptics, T_base_fixture: Floats, q_rad: Floats, first: int) -> Floats:
+def spots_at(arm: AssumedArm, optics: FixtureOptics, T_base_fixture: Floats, q_rad: Floats, first: int) -> Floats:
     """Spots (4,) m expected at joint readings `q_rad`."""
     return optics.spots(*in_fixture(T_base_fixture, *arm.beam(q_rad)), first)
 
 
 def spots_by_joints(
-    arm: BelievedArm, optics: FixtureOptics, T_base_fixture: Floats, q_rad: Floats, first: int
+    arm: AssumedArm, optics: FixtureOptics, T_base_fixture: Floats, q_rad: Floats, first: int
 ) -> Floats:
     """d(spots)/dq, (4, joint): Jp Ad(T) Jr of Deng, Ding, Zhang 2019, equation (6)."""
     sensor = optics.spots_by_beam(*in_fixture(T_base_fixture, *arm.beam(q_rad)), first)
     return sensor @ beam_by_joints(arm, T_base_fixture, q_rad)
 
 
-def beam_by_joints(arm: BelievedArm, T_base_fixture: Floats, q_rad: Floats) -> Floats:
+def beam_by_joints(arm: AssumedArm, T_base_fixture: Floats, q_rad: Floats) -> Floats:
     """d(origin, direction)/dq, (6, joint), of the beam as seen from the fixture."""
     return (T_base_fixture[:3, :3].T @ arm.beam_jacobian(q_rad).reshape(2, 3, -1)).reshape(6, -1)
 
@@ -97,7 +97,7 @@ def between(near: BeamTarget, far: BeamTarget, share: float) -> BeamTarget:
     return BeamTarget(far.first, (x1, y1, x2, y2), stand_off_m, mixed(near.roll_rad, far.roll_rad))
 
 
-def flange_for(arm: BelievedArm, optics: FixtureOptics, T_base_fixture: Floats, target: BeamTarget) -> Floats:
+def flange_for(arm: AssumedArm, optics: FixtureOptics, T_base_fixture: Floats, target: BeamTarget) -> Floats:
     """T_base_flange (4, 4) that puts the assumed beam on target."""
     hit_m, direction = optics.line(np.array(target.spots_m), target.first)
     R = T_base_fixture[:3, :3]
@@ -112,7 +112,7 @@ def flange_for(arm: BelievedArm, optics: FixtureOptics, T_base_fixture: Floats, 
     return T
 
 
-def laser_in_flange(arm: BelievedArm) -> tuple[Floats, Floats]:
+def laser_in_flange(arm: AssumedArm) -> tuple[Floats, Floats]:
     """Laser origin (3,) m and direction (3,) in the flange frame, read off the assumed arm at its zero."""
     q_rad = np.zeros(arm.lower_rad.size)
     T = flange(arm, q_rad)
@@ -137,7 +137,7 @@ ELBOW = 2  # frame behind the second link
 
 
 def reach(
-    arm: BelievedArm, T_base_flange: Floats, near_rad: Floats, rng: np.random.Generator, starts: int = 12
+    arm: AssumedArm, T_base_flange: Floats, near_rad: Floats, rng: np.random.Generator, starts: int = 12
 ) -> Floats:
     """Joint readings (joint,) that put the flange there, the first found close to `near_rad`. UnreachableError.
 
@@ -155,13 +155,13 @@ def reach(
     )
 
 
-def clear_of_table(arm: BelievedArm, q_rad: Floats) -> bool:
+def clear_of_table(arm: AssumedArm, q_rad: Floats) -> bool:
     """Whether elbow, wrist and laser stay above the base plane."""
     origin_m, _ = arm.beam(q_rad)
     return bool(np.min(arm.frames(q_rad[None])[0, ELBOW:, 2, 3]) > TABLE_M and origin_m[2] > TABLE_M)
 
 
-def _starts(arm: BelievedArm, near_rad: Floats, rng: np.random.Generator, starts: int) -> Iterator[Floats]:
+def _starts(arm: AssumedArm, near_rad: Floats, rng: np.random.Generator, starts: int) -> Iterator[Floats]:
     yield near_rad
     for k in range(starts - 1):
         yield near_rad + rng.normal(0.0, 0.3 + 0.1 * k, near_rad.size)

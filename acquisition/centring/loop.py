@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.bench import Bench, Look
-from acquisition.centring.aim import BelievedArm
+from acquisition.centring.aim import AssumedArm
 
 Floats = NDArray[np.float64]
 
@@ -100,7 +100,7 @@ LEAST_TRUST_RAD = 1e-3  # feels right: less brings the spots nowhere within the 
 class Loop:
     """One run; the only owner of its trace."""
 
-    def __init__(self, bench: Bench, arm: BelievedArm, strategy: Strategy, limits: Limits) -> None:
+    def __init__(self, bench: Bench, arm: AssumedArm, strategy: Strategy, limits: Limits) -> None:
         self._bench, self._arm, self._strategy, self._limits = bench, arm, strategy, limits
         self._trace: list[Step] = []
         self._q_rad = np.empty(0)
@@ -195,7 +195,7 @@ class Loop:
 
 
 def centre(
-    bench: Bench, arm: BelievedArm, strategy: Strategy, q_rad: Floats, target_m: Floats, limits: Limits | None = None
+    bench: Bench, arm: AssumedArm, strategy: Strategy, q_rad: Floats, target_m: Floats, limits: Limits | None = None
 ) -> Centring:
     """Bring both spots to `target_m` (4,) m; the arm stands at command `q_rad`. Never raises for lack of light."""
     return Loop(bench, arm, strategy, limits or Limits()).run(q_rad, target_m)

@@ -176,7 +176,7 @@ class Navigator:
         run = centre(self._bench, arm, strategy, self.q_rad, np.array(target.spots_m), limits)
         for step in run.trace[1:]:
             self._note(step.q_rad)
-        self._journal.event("centring", _told(run, self._placement, target, limits))
+        self._journal.event("centring", _centring_record(run, self._placement, target, limits))
         if not all(run.look.lit(target.first)):
             raise SpotLostError(f"the light was lost while centring: {run.status.value}")
         here = fixture_after(run, strategy, arm, optics, T, target.first)
@@ -220,7 +220,7 @@ class Navigator:
         self.q_rad = q_rad
 
 
-def _told(run: Centring, placement: int, target: BeamTarget, limits: Limits) -> dict[str, object]:
+def _centring_record(run: Centring, placement: int, target: BeamTarget, limits: Limits) -> dict[str, object]:
     return {
         "placement": placement,
         "first_psd": target.first,

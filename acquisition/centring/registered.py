@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
-from acquisition.centring.aim import BelievedArm, FixtureOptics, beam_by_joints, in_fixture, spots_at
+from acquisition.centring.aim import AssumedArm, FixtureOptics, beam_by_joints, in_fixture, spots_at
 from acquisition.centring.loop import Proposal
 
 Floats = NDArray[np.float64]
@@ -39,12 +39,12 @@ INNER_RAD = 0.02
 DIFFERENCE_RAD = 1e-4
 
 
-def grip(arm: BelievedArm, q_rad: Floats, stand_off_m: float) -> float:
+def grip(arm: AssumedArm, q_rad: Floats, stand_off_m: float) -> float:
     """Least singular value of d(line)/dq: offset (by LEVER_M) and tilt of the beam where it meets the first face."""
     return float(np.linalg.svd(_line_jacobian(arm, q_rad, stand_off_m), compute_uv=False)[-1])
 
 
-def rolled(arm: BelievedArm, q_rad: Floats, stand_off_m: float) -> Floats:
+def rolled(arm: AssumedArm, q_rad: Floats, stand_off_m: float) -> Floats:
     """A joint step (joint,) that rolls about the assumed beam towards the better grip, until that is twice enough."""
     begin_rad, (origin_m, direction) = q_rad, arm.beam(q_rad)
     while grip(arm, q_rad, stand_off_m) < 2.0 * LEAST_GRIP:
@@ -76,19 +76,19 @@ def rolled(arm: BelievedArm, q_rad: Floats, stand_off_m: float) -> Floats:
     return q_rad - begin_rad
 
 
-def _line_jacobian(arm: BelievedArm, q_rad: Floats, stand_off_m: float) -> Floats:
+def _line_jacobian(arm: AssumedArm, q_rad: Floats, stand_off_m: float) -> Floats:
     """(4, joint)."""
     across, J = _across(arm.beam(q_rad)[1]), arm.beam_jacobian(q_rad)
     return np.vstack([across @ (J[:3] + stand_off_m * J[3:]) / LEVER_M, across @ J[3:]])
 
 
-def _held(arm: BelievedArm, q_rad: Floats, stand_off_m: float) -> Floats:
+def _held(arm: AssumedArm, q_rad: Floats, stand_off_m: float) -> Floats:
     """(5, joint): the line, and the laser's place along it; the roll alone is free."""
     along = arm.beam(q_rad)[1] @ arm.beam_jacobian(q_rad)[:3] / LEVER_M
     return np.vstack([_line_jacobian(arm, q_rad, stand_off_m), along])
 
 
-def _gradient(arm: BelievedArm, q_rad: Floats, stand_off_m: float) -> Floats:
+def _gradient(arm: AssumedArm, q_rad: Floats, stand_off_m: float) -> Floats:
     here = grip(arm, q_rad, stand_off_m)
     steps = DIFFERENCE_RAD * np.eye(q_rad.size)
     return np.array([grip(arm, q_rad + step, stand_off_m) - here for step in steps]) / DIFFERENCE_RAD
@@ -105,7 +105,7 @@ FIRST_GAIN = 0.6
 TURN_PRIOR_RAD = 0.7  # how wrong the guess may be about the beam, one sigma
 SLIDE_PRIOR_M = 0.05  # and along it
 SPOT_SIGMA_M = 3e-5  # floor of the trust in a prediction between poses
-ARM_DOUBT = 0.05  # predicted motion is wrong by this share (2 deg of joint zero: 3.5 %)
+ARM_ERROR_SHARE = 0.05  # predicted motion is wrong by this share (2 deg of joint zero: 3.5 %)
 
 # The laser can stand neither inside the fixture nor further away than a small arm reaches.
 STAND_OFF_RANGE_M = (0.02, 1.0)
@@ -118,7 +118,7 @@ class Registered:
 
     def __init__(
         self,
-        arm: BelievedArm,
+        arm: AssumedArm,
         optics: FixtureOptics,
         T_base_fixture: Floats,
         first: int,
@@ -180,7 +180,7 @@ class Registered:
             T = moved(x)
             rows = [np.array([x[0] / TURN_PRIOR_RAD, x[1] / SLIDE_PRIOR_M])]
             for q_rad, spots_m in zip(self._q_rad[:-1], self._spots_m[:-1], strict=True):
-                sigma_m = SPOT_SIGMA_M + ARM_DOUBT * float(np.linalg.norm(spots_m - self._spots_m[-1]))
+                sigma_m = SPOT_SIGMA_M + ARM_ERROR_SHARE * float(np.linalg.norm(spots_m - self._spots_m[-1]))
                 rows.append((spots_at(self._arm, self._optics, T, q_rad, self._first) - spots_m) / sigma_m)
             return np.concatenate(rows)
 
@@ -192,7 +192,7 @@ class Registered:
 
 
 def correction(
-    arm: BelievedArm,
+    arm: AssumedArm,
     optics: FixtureOptics,
     T_base_fixture: Floats,
     q_rad: Floats,
@@ -213,7 +213,7 @@ def correction(
 
 
 def stand_off(
-    arm: BelievedArm, optics: FixtureOptics, T_base_fixture: Floats, q_rad: Floats, spots_m: Floats, first: int
+    arm: AssumedArm, optics: FixtureOptics, T_base_fixture: Floats, q_rad: Floats, spots_m: Floats, first: int
 ) -> float:
     """From the laser to the first face along the beam (m), as assumed, within what can be."""
     hit_m, direction = optics.line(spots_m, first)
@@ -227,7 +227,7 @@ class FixedGuess:
     name = "law8"
 
     def __init__(
-        self, arm: BelievedArm, optics: FixtureOptics, T_base_fixture: Floats, first: int, gain: float = 0.5
+        self, arm: AssumedArm, optics: FixtureOptics, T_base_fixture: Floats, first: int, gain: float = 0.5
     ) -> None:
         self._arm, self._optics, self._T, self._first, self._gain = arm, optics, T_base_fixture, first, gain
         self._q_rad = np.empty(0)

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.bench import Bench, Look
-from acquisition.centring.aim import BeamTarget, BelievedArm, FixtureOptics, flange_for, reach, spots_by_joints
+from acquisition.centring.aim import AssumedArm, BeamTarget, FixtureOptics, flange_for, reach, spots_by_joints
 from acquisition.centring.camera.board import Sight
 from acquisition.errors import UnreachableError
 
@@ -50,7 +50,7 @@ class CameraAim:
 class Aim:
     """One aim; the only owner of where the arm stands meanwhile."""
 
-    def __init__(self, bench: Bench, sight: Sight, arm: BelievedArm, optics: FixtureOptics) -> None:
+    def __init__(self, bench: Bench, sight: Sight, arm: AssumedArm, optics: FixtureOptics) -> None:
         self._bench, self._sight, self._arm, self._optics = bench, sight, arm, optics
         self._motions = 0
 
@@ -131,7 +131,7 @@ class Search:
     def __init__(
         self,
         bench: Bench,
-        arm: BelievedArm,
+        arm: AssumedArm,
         optics: FixtureOptics,
         T_base_fixture: Floats,
         first: int,

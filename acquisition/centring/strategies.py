@@ -13,7 +13,7 @@ from enum import Enum
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.centring.aim import BelievedArm, FixtureOptics, spots_by_joints
+from acquisition.centring.aim import AssumedArm, FixtureOptics, spots_by_joints
 from acquisition.centring.loop import Centring, Proposal, Strategy
 from acquisition.centring.registered import FIRST_GAIN, FixedGuess, Registered
 from acquisition.errors import AcquisitionError
@@ -31,7 +31,7 @@ class MeasuredStrategy:
 
     name = "measured"
 
-    def __init__(self, arm: BelievedArm, optics: FixtureOptics, T_base_fixture: Floats, first: int) -> None:
+    def __init__(self, arm: AssumedArm, optics: FixtureOptics, T_base_fixture: Floats, first: int) -> None:
         self._arm, self._optics, self._T, self._first = arm, optics, T_base_fixture, first
         self._base_q = np.empty(0)
         self._base_c = np.empty(0)
@@ -112,7 +112,7 @@ class CentringChoice:
         return cls(by, gain)
 
     def strategy(
-        self, arm: BelievedArm, optics: FixtureOptics, T_base_fixture: Floats, first: int, *, known: bool
+        self, arm: AssumedArm, optics: FixtureOptics, T_base_fixture: Floats, first: int, *, known: bool
     ) -> Strategy:
         """A strategy for one run; `known`: T_base_fixture is right where the arm stands, from an earlier lit pose."""
         make: Mapping[CentringBy, Callable[[], Strategy]] = {
@@ -126,7 +126,7 @@ class CentringChoice:
 
 
 def fixture_after(
-    run: Centring, strategy: Strategy, arm: BelievedArm, optics: FixtureOptics, T_base_fixture: Floats, first: int
+    run: Centring, strategy: Strategy, arm: AssumedArm, optics: FixtureOptics, T_base_fixture: Floats, first: int
 ) -> Floats:
     """T_base_fixture (4, 4) as the readings of a run have it, whatever strategy made them; for the next pose."""
     if isinstance(strategy, Registered):

@@ -94,7 +94,7 @@ class Reading:
 
 
 @dataclass(frozen=True)
-class Doubt:
+class OffTarget:
     """How far a reading is from where it should be."""
 
     miss_m: float
@@ -110,7 +110,7 @@ class Judge(Protocol):
 
     def learn(self, readings: Sequence[Reading]) -> None: ...
 
-    def doubt(self, visit: Sequence[Reading]) -> Doubt | None:
+    def off_target(self, visit: Sequence[Reading]) -> OffTarget | None:
         """Of the readings of one visit, against all learned; None where nothing speaks against them."""
         ...
 

@@ -97,14 +97,14 @@ class GuidedSession:
             ]
             if len(readings) < len(visit.targets):
                 continue
-            doubt = self.judge.doubt(readings)
-            if doubt is not None and attempt < ATTEMPTS:
+            off = self.judge.off_target(readings)
+            if off is not None and attempt < ATTEMPTS:
                 self._counts["slips"] += 1
-                self.journal.event("slip", {"target": visit.says, "miss_m": doubt.miss_m, "sigmas": doubt.sigmas})
+                self.journal.event("slip", {"target": visit.says, "miss_m": off.miss_m, "sigmas": off.sigmas})
                 continue
-            if doubt is not None:
+            if off is not None:
                 self._counts["doubted"] += 1
-                self.journal.event("doubted", {"target": visit.says, "miss_m": doubt.miss_m, "sigmas": doubt.sigmas})
+                self.journal.event("doubted", {"target": visit.says, "miss_m": off.miss_m, "sigmas": off.sigmas})
             return self._keep(readings)
         self._counts["skipped"] += 1
         self.journal.event("skipped", {"target": visit.says, "why": f"no reading in {ATTEMPTS} attempts"})

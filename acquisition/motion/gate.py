@@ -31,7 +31,7 @@ Floats = NDArray[np.float64]
 
 HALTED = "the motion was halted; the arm was stopped through its controller"
 PIPELINE = 4  # solutions that are made before the set-points come to them: a path that rests must rest so long
-ELSEWHERE_RAD = 1e-3  # an arm further from where its plan begins was moved meanwhile
+DISPLACED_RAD = 1e-3  # an arm further from where its plan begins was moved meanwhile
 
 
 class Gate:
@@ -179,7 +179,7 @@ class Gate:
         if self._state not in OVER:
             raise RefusedMotionError(f"a motion is under way ({self._state.value}); wait for its end, or stop it")
         off = np.abs(now_rad - made.start_rad)
-        if np.max(off) > ELSEWHERE_RAD:
+        if np.max(off) > DISPLACED_RAD:
             joint = int(np.argmax(off))
             raise RefusedMotionError(
                 f"joint {joint + 1} stands {np.degrees(off[joint]):.2f}° from where the plan begins; plan again"

@@ -158,9 +158,9 @@ def _off_m(made: Plan, q_rad: Floats) -> Floats:
     way_m = tips_m(np.array([path.at(t_s, STANDING) for t_s in np.arange(0.0, made.t_s[-1] + STEP_S, STEP_S)]))
     seen_m = tips_m(q_rad)
     nearest = np.asarray(KDTree(way_m).query(seen_m)[1])
-    beside = [_from_chord_m(seen_m, way_m[np.maximum(nearest - 1, 0)], way_m[nearest]),
+    distances_m = [_from_chord_m(seen_m, way_m[np.maximum(nearest - 1, 0)], way_m[nearest]),
               _from_chord_m(seen_m, way_m[nearest], way_m[np.minimum(nearest + 1, len(way_m) - 1)])]  # fmt: skip
-    out: Floats = np.min(beside, axis=0)
+    out: Floats = np.min(distances_m, axis=0)
     return out
 
 

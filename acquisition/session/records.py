@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.bench import ArmReading, Look, Spot
-from acquisition.centring.aim import BelievedArm, FixtureOptics
+from acquisition.centring.aim import AssumedArm, FixtureOptics
 from acquisition.session.plan import PoseKey
 
 Floats = NDArray[np.float64]
@@ -113,7 +113,7 @@ class Learner(Protocol):
     """What is known now."""
 
     @property
-    def arm(self) -> BelievedArm: ...
+    def arm(self) -> AssumedArm: ...
 
     @property
     def optics(self) -> FixtureOptics: ...

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.bench import Bench, Look
-from acquisition.centring.aim import BelievedArm, clear_of_table
+from acquisition.centring.aim import AssumedArm, clear_of_table
 from acquisition.centring.camera.board import Sight
 from acquisition.centring.loop import CentringStatus, Limits
 from acquisition.centring.navigator import GLANCE_S, Navigator
@@ -21,7 +21,7 @@ from acquisition.recording.pose_plan import PlannedPose, PosePlan
 from acquisition.session.control import RunControl
 from acquisition.session.plan import Block, PlanOptions, PoseKey, Visit, blocks
 from acquisition.session.records import Journal, Learner, Phase, Progress, Sample, Tell, key_detail, silent
-from acquisition.session.stepping import ELSEWHERE_RAD, DrivenSession, InterruptibleBench, Steps, Summary
+from acquisition.session.stepping import DISPLACED_RAD, DrivenSession, InterruptibleBench, Steps, Summary
 
 Floats = NDArray[np.float64]
 
@@ -41,7 +41,7 @@ def check_planned(plan: PosePlan) -> None:
             )
 
 
-def go_to_planned(navigator: Navigator, arm: BelievedArm, pose: PlannedPose, key: PoseKey, opposite_rad: float) -> None:
+def go_to_planned(navigator: Navigator, arm: AssumedArm, pose: PlannedPose, key: PoseKey, opposite_rad: float) -> None:
     """To the pose from its side; where it is dark there, to light near it and the spots that were expected."""
     q_rad = np.array(pose.q_rad)
     if not clear_of_table(arm, q_rad):
@@ -53,7 +53,7 @@ def go_to_planned(navigator: Navigator, arm: BelievedArm, pose: PlannedPose, key
         _approach(navigator, arm, found_rad, pose, opposite_rad)
 
 
-def _approach(navigator: Navigator, arm: BelievedArm, q_rad: Floats, pose: PlannedPose, opposite_rad: float) -> None:
+def _approach(navigator: Navigator, arm: AssumedArm, q_rad: Floats, pose: PlannedPose, opposite_rad: float) -> None:
     """Every joint that has a way comes this way, from inside its range."""
     way = np.array(pose.approach or np.zeros(len(q_rad)))
     before = q_rad - opposite_rad * way
@@ -231,10 +231,10 @@ class Session(DrivenSession[Sample]):
     def _come_back(self) -> None:
         """To where the last step ended, slowly as every motion."""
         back_rad = self._navigator.q_rad - self._bench.look(GLANCE_S).q_rad
-        if float(np.max(np.abs(back_rad))) <= ELSEWHERE_RAD:
+        if float(np.max(np.abs(back_rad))) <= DISPLACED_RAD:
             return
         self._astray()
-        came = np.where(np.abs(back_rad) > ELSEWHERE_RAD, np.sign(back_rad), self._navigator.approach)
+        came = np.where(np.abs(back_rad) > DISPLACED_RAD, np.sign(back_rad), self._navigator.approach)
         self._navigator.move(self._navigator.q_rad)
         self._navigator.approach = came.astype(np.int64)
 

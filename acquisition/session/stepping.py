@@ -20,7 +20,7 @@ from acquisition.session.records import Journal
 Floats = NDArray[np.float64]
 Steps = Iterator[Callable[[], None]]
 Taken = TypeVar("Taken")
-ELSEWHERE_RAD = 1e-3  # as acquisition/motion/gate.py: an arm further away was moved meanwhile
+DISPLACED_RAD = 1e-3  # as acquisition/motion/gate.py: an arm further away was moved meanwhile
 
 
 class InterruptibleBench:

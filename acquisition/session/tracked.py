@@ -17,7 +17,7 @@ from acquisition.recording.pose_plan import PlannedPose, PosePlan
 from acquisition.recording.samples import Cell
 from acquisition.session.control import RunControl
 from acquisition.session.records import Journal, row_of
-from acquisition.session.stepping import ELSEWHERE_RAD, DrivenSession, Steps, Summary
+from acquisition.session.stepping import DISPLACED_RAD, DrivenSession, Steps, Summary
 from acquisition.wires.tracker_bench import TargetLook
 
 Floats = NDArray[np.float64]
@@ -104,7 +104,7 @@ class TrackedSession(DrivenSession[TrackedSample]):
         if self._at_rad is not None:
             self._control.check()
             q_rad = self._bench.look(GLANCE_S).q_rad
-            self._at_rad = np.where(np.abs(q_rad - self._at_rad) > ELSEWHERE_RAD, q_rad, self._at_rad)
+            self._at_rad = np.where(np.abs(q_rad - self._at_rad) > DISPLACED_RAD, q_rad, self._at_rad)
 
     def _take(self, number: int, pose: PlannedPose) -> None:
         q_rad, way = np.array(pose.q_rad), np.array(pose.approach or np.zeros(len(pose.q_rad)))

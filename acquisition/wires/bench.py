@@ -123,7 +123,7 @@ class ArmOnWires:
     supervisor: Supervisor
     clock: Clock
     hurry: float = 1.0  # device seconds in one second of this program's clock
-    beside: Mapping[str, Pump] = field(default_factory=dict[str, Pump])  # further instruments, by name
+    further: Mapping[str, Pump] = field(default_factory=dict[str, Pump])  # further instruments, by name
     _cmd_rad: Floats = field(default_factory=lambda: np.empty(0), init=False)
     _start_s: float | None = field(default=None, init=False)
 
@@ -159,7 +159,7 @@ class ArmOnWires:
             qd_rad_s=qd_rad_s.mean(axis=0),
             cmd_rad=self._cmd_rad.copy(),
             encoder_rad=encoders_since(self.pumps.encoders, begin_s),
-            temperatures_degC={**temperatures_degC, **temperatures, **temperatures_beside(self.beside)},
+            temperatures_degC={**temperatures_degC, **temperatures, **further_temperatures(self.further)},
             settled=settled,
         )
 
@@ -248,7 +248,7 @@ def encoders_since(pump: Pump | None, begin_s: float) -> Floats | None:
     return np.where(count > 0, np.where(answered, each, 0.0).sum(axis=0) / np.maximum(count, 1), np.nan)
 
 
-def temperatures_beside(pumps: Mapping[str, Pump]) -> dict[str, float]:
+def further_temperatures(pumps: Mapping[str, Pump]) -> dict[str, float]:
     """The newest of every temperature that further instruments measure: by their names, or name and channel."""
     found: dict[str, float] = {}
     for name, pump in pumps.items():

@@ -15,7 +15,7 @@ from calibeam.console import Console
 from calibeam.devices.recorder import RecordingJournal, new_recording
 from calibeam.devices.site import addresses_of, check_session, connected
 from calibeam.outcome import CheckFailed, PartialResult, interruption
-from calibeam.site_log import SITE_LOG, beside, logged
+from calibeam.site_log import SITE_LOG, logged, site_log_of
 from drivers.clock import SystemClock
 
 if TYPE_CHECKING:
@@ -88,7 +88,7 @@ def centre_command(
     from calibeam.learner import FittedLearner
 
     out.parent.mkdir(parents=True, exist_ok=True)
-    SITE_LOG.begin(beside(out))
+    SITE_LOG.begin(site_log_of(out))
     try:
         with (
             new_recording(out, rig_text(rig), clock, {"purpose": "centring"}) as writer,

@@ -41,16 +41,16 @@ def check_recording(path: Path, *, as_json: bool = False) -> bool:
 
 def lines(recording: Recording, findings: tuple[Finding, ...]) -> list[str]:
     """For a person: the file, each stream with its rate and clock, each finding."""
-    told = [f"{recording.path}: settled samples: {len(recording.samples)}, events: {len(recording.events)}"]
-    told += [f"  {stream.name}: {_rate(stream)}; {_clock(stream)}" for stream in recording.streams.values()]
-    told += [f"  {f.severity.value}: {f.problem.value}: {f.where}: {f.says}" for f in findings[:MOST_LINES]]
+    reported = [f"{recording.path}: settled samples: {len(recording.samples)}, events: {len(recording.events)}"]
+    reported += [f"  {stream.name}: {_rate(stream)}; {_clock(stream)}" for stream in recording.streams.values()]
+    reported += [f"  {f.severity.value}: {f.problem.value}: {f.where}: {f.says}" for f in findings[:MOST_LINES]]
     if len(findings) > MOST_LINES:
-        told.append(f"  and {len(findings) - MOST_LINES} more findings; --json prints all")
+        reported.append(f"  and {len(findings) - MOST_LINES} more findings; --json prints all")
     errors = any(finding.is_error for finding in findings)
     if errors:
-        return [*told, "  not fit for use: errors above"]
+        return [*reported, "  not fit for use: errors above"]
     warned = any(f.severity.value == "warning" for f in findings)
-    return [*told, "  no errors; see the warnings above" if warned else "  no errors"]
+    return [*reported, "  no errors; see the warnings above" if warned else "  no errors"]
 
 
 def _rate(stream: Stream) -> str:

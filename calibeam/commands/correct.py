@@ -243,8 +243,8 @@ def _program(console: Console, job: _Job, poses: Path, out: Path, options: Optio
 
 def _with_partner(poses: Path, out: Path) -> tuple[list[Path], list[Path]]:
     """A KRL program and its data list, in this order, and where they go; of other programs the one file."""
-    beside = {path.suffix.lower(): path for path in poses.parent.iterdir() if path.stem == poses.stem}
-    files = [beside[end] for end in KRL_PAIR if end in beside]
+    same_stem = {path.suffix.lower(): path for path in poses.parent.iterdir() if path.stem == poses.stem}
+    files = [same_stem[end] for end in KRL_PAIR if end in same_stem]
     if poses.suffix.lower() not in KRL_PAIR or len(files) < len(KRL_PAIR):
         return [poses], [out]
     outs = [out.with_suffix(path.suffix) for path in files]

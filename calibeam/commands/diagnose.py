@@ -83,8 +83,8 @@ def diagnose_command(
         refuse_wrong_file(found, out)
         modelled = "" if model_out is None else _write_model(model_out, model_of_diagnosis(found, source), file)
         planned = "" if plan_out is None else plan_next(found, plan_out)
-    told = msgspec.structs.replace(file, next=(*file.next, planned)) if planned else file
-    page = write_diagnosis_report(out.with_suffix(".html") if report is None else report, source, told)
+    reported = msgspec.structs.replace(file, next=(*file.next, planned)) if planned else file
+    page = write_diagnosis_report(out.with_suffix(".html") if report is None else report, source, reported)
     if not json:
         for line in filter(None, (planned, f"diagnosis: {out}", modelled, f"report: {page}")):
             console.print(line, markup=False, highlight=False)

@@ -143,8 +143,8 @@ def _export(console: Console, rig: Rig, out: Path, export: tuple[ExportForm, ...
         return
     model, lost = read_model(out), tuple[str, ...]()
     for form in export:
-        beside = out.with_name(out.stem + form.suffix)
-        lost = export_model(beside, rig, model, form)
-        console.print(f"{form.name}: {beside}", markup=False)
+        exported = out.with_name(out.stem + form.suffix)
+        lost = export_model(exported, rig, model, form)
+        console.print(f"{form.name}: {exported}", markup=False)
     for says in lost:
         console.print(says, markup=False, highlight=False)

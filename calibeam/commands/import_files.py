@@ -203,10 +203,10 @@ def _logs(tables: Sequence[Understanding], out: Path, *, yes: bool) -> None:
     names = ", ".join(str(table.sheet.path.name) for table in tables)
     with taken_back(out):
         write_recording(recording, out, software=SOFTWARE, imported_from=names, started_utc=started_utc)
-        beside = write_columns(about, out)
+        columns_path = write_columns(about, out)
     for name, stream in recording.streams.items():
         console.print(f"{out}: {name}, {counted(len(stream.host_s), 'row')}", markup=False, highlight=False)
-    console.print(f"columns: {beside}", markup=False, highlight=False)
+    console.print(f"columns: {columns_path}", markup=False, highlight=False)
 
 
 def _agreed(*, yes: bool) -> None:
@@ -231,8 +231,8 @@ def _table(table: Understanding, out: Path, *, yes: bool) -> None:
     print_columns(console, about)
     _agreed(yes=yes)
     with taken_back(out):
-        beside = write_session(table, samples, about, out)
-    for line in (f"{out}: {RIG} and {CSV} with {counted(len(samples), 'sample')}", f"columns: {beside}"):
+        columns_path = write_session(table, samples, about, out)
+    for line in (f"{out}: {RIG} and {CSV} with {counted(len(samples), 'sample')}", f"columns: {columns_path}"):
         console.print(line, markup=False, highlight=False)
 
 

@@ -67,12 +67,12 @@ def live_command(
     from calibeam.live.page import PageAddress, live_page  # the web server takes a while to load: only here
 
     loaded, clock = load_rig(rig), SystemClock()
-    believed = {} if model is None else _corrections(model, loaded)
+    assumed = {} if model is None else _corrections(model, loaded)
     with (
         live_page(loaded, clock, PageAddress(host, port, token), "watch") as page,
         outlets(foxglove, plotjuggler, loaded.name) as (served, says),
     ):
-        page.feed.believes(believed)
+        page.feed.believes(assumed)
         page.feed.also = LiveViews(served, lambda: page.feed.view).heard
         print(json.dumps({"url": page.url}) if json_ else f"live page: {page.url} (Ctrl-C ends it)", flush=True)
         for sentence in () if json_ else says:

@@ -61,7 +61,7 @@ def motion_command(
         raise TaskError(f"--only {' '.join(strangers)}: the examples are {', '.join(EXAMPLES)}")
     loaded, clock = load_rig(rig), SystemClock()
     out.mkdir(parents=True, exist_ok=True)
-    solver, told = solver_of(loaded), dict[str, dict[str, float]]()
+    solver, figures_of = solver_of(loaded), dict[str, dict[str, float]]()
 
     def draw(name: str, made: Plan) -> None:
         draw_plan_file(made, cell_of(loaded), out / f"plan-{name}.svg")
@@ -72,18 +72,18 @@ def motion_command(
         for name in only or EXAMPLES:
             shown = EXAMPLES[name](stage)
             plot(shown, solver, out)
-            told[name] = numbers_of(shown, solver)
-    figures = {"schema": 1, "kind": "calibeam-motion", "examples": told}
+            figures_of[name] = numbers_of(shown, solver)
+    figures = {"schema": 1, "kind": "calibeam-motion", "examples": figures_of}
     write_output(out / "motion.json", json.dumps(figures, indent=1) + "\n", json_output("calibeam-motion"))
     if json_:
-        print(json.dumps(told))
+        print(json.dumps(figures_of))
     else:
-        _print(Console(), told, out)
+        _print(Console(), figures_of, out)
 
 
-def _print(console: Console, told: dict[str, dict[str, float]], out: Path) -> None:
+def _print(console: Console, figures_of: dict[str, dict[str, float]], out: Path) -> None:
     table = Table("example", "figure", "value", box=None)
-    for name, numbers in told.items():
+    for name, numbers in figures_of.items():
         for what, value in numbers.items():
             metres = what.endswith(", m")
             table.add_row(name, what.removesuffix(", m"), f"{1e3 * value:.4f} mm" if metres else f"{value:.4g}")

@@ -83,14 +83,14 @@ def psd_check_command(rig: Path, *, points: Path, unit: int = 1, out: Path | Non
         seen = collect(psd, face, unit, place_m, ready)
     finally:
         psd.close()
-    told: list[str] = []
+    lines: list[str] = []
     if seen.counts is not None:
-        told = unit_lines(check_unit(place_m, seen.counts, face.metres_per_ratio), device, unit)
-        for line in told:
+        lines = unit_lines(check_unit(place_m, seen.counts, face.metres_per_ratio), device, unit)
+        for line in lines:
             print(line)
     fit = fit_error_map(place_m, seen.shown_m, 0.5 * face.length_m)
     print(map_line(fit))
-    if out is not None and any(RIG_DIFFERS in line for line in told):
+    if out is not None and any(RIG_DIFFERS in line for line in lines):
         # A map of spots that the rig mirrors or scales would do so a second time once the rig is put right.
         raise SamplesError(f"{out}: not written; correct {rig} first, then measure the map again")
     if out is not None and fit.map is not None:

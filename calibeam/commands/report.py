@@ -28,8 +28,8 @@ def read_earlier_calibration(path: Path) -> Calibration:
     if path.suffix == ".json":
         return Calibration(str(path), read_model(path))
     if path.is_dir() and (path / MODEL).exists():
-        told = path / DIAGNOSIS
-        return Calibration(str(path), read_model(path / MODEL), None, read_diagnosis(told) if told.exists() else None)
+        found = path / DIAGNOSIS
+        return Calibration(str(path), read_model(path / MODEL), None, read_diagnosis(found) if found.exists() else None)
     recording = read(path)
     return Calibration(_label(recording), identify_and_judge(recording).model, recording)
 

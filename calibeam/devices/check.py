@@ -62,8 +62,8 @@ class DeviceCheck:
         if self.wrong and not self.what:
             return brief(f"{self.device:9s} error  {self.wrong}")
         facts = [self.what, f"firmware {self.firmware}" if self.firmware else "", f"{self.rate_hz:.0f} Hz", self.noise]
-        told = ", ".join(fact for fact in facts if fact)
-        return brief(f"{self.device:9s} " + (f"error  {told}: {self.wrong}" if self.wrong else f"ok     {told}"))
+        text = ", ".join(fact for fact in facts if fact)
+        return brief(f"{self.device:9s} " + (f"error  {text}: {self.wrong}" if self.wrong else f"ok     {text}"))
 
 
 def check_devices(rig: Rig, clock: Clock) -> Iterator[DeviceCheck]:
@@ -122,14 +122,14 @@ def _psd(device: PsdDevice, rig: Rig, clock: Clock) -> DeviceCheck:
         window = psd_window(blocks)
         spots_m = psd_view(psd, device).each(window)
     dark = [k + 1 for k in (0, 1) if np.isnan(spots_m[:, 2 * k]).mean() > 0.5]
-    told = "no light on either face" if len(dark) == 2 else f"noise {1e6 * sample_noise(spots_m):.2f} µm a sample"
+    text = "no light on either face" if len(dark) == 2 else f"noise {1e6 * sample_noise(spots_m):.2f} µm a sample"
     rate_hz, wrong = sample_rate(blocks, device.rate_hz)
     if (window.flags & (Flag.PSD1_SATURATED | Flag.PSD2_SATURATED)).any():
         wrong = wrong or "a face is saturated: reduce the laser's power or the gain"
     if identity is not None:
         wrong = wrong or uneven_layers(identity.faces, [k + 1 not in dark for k in (0, 1)], window.current_a)
     what = "" if identity is None else f"{identity.model} {identity.serial_number}"
-    return DeviceCheck("psd", what, "" if identity is None else identity.firmware, rate_hz, told, wrong)
+    return DeviceCheck("psd", what, "" if identity is None else identity.firmware, rate_hz, text, wrong)
 
 
 def _tracker(device: TrackerDevice, clock: Clock) -> DeviceCheck:
@@ -144,10 +144,10 @@ def _tracker(device: TrackerDevice, clock: Clock) -> DeviceCheck:
     if len(good_m) < 2:
         return DeviceCheck("tracker", what, "", rate_hz, "", "no valid reading: let it see the target")
     x, y, z = good_m.mean(axis=0)
-    told = f"noise {1e6 * sample_noise(good_m):.2f} µm a sample, target at ({x:.3f}, {y:.3f}, {z:.3f}) m"
+    text = f"noise {1e6 * sample_noise(good_m):.2f} µm a sample, target at ({x:.3f}, {y:.3f}, {z:.3f}) m"
     if len(good_m) < len(position_m):
         wrong = wrong or f"{len(position_m) - len(good_m)} of {len(position_m)} readings are not valid: free the beam"
-    return DeviceCheck("tracker", what, "", rate_hz, told, wrong)
+    return DeviceCheck("tracker", what, "", rate_hz, text, wrong)
 
 
 def _other(other: OtherDevice, clock: Clock) -> DeviceCheck:

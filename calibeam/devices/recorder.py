@@ -181,10 +181,10 @@ def _ended_early(
     if earlier is not None and earlier.samples:
         count, place = session.taken + earlier.samples, earlier.folder
         newest = f" ({session.taken} of them in {writer.path.name})"
-    told = f"samples kept in {place}: {count}{newest}"
+    kept_text = f"samples kept in {place}: {count}{newest}"
     if count:
-        told += f"; `calibeam identify {place}` fits them"
-    return PartialResult("; ".join([reason, *dict.fromkeys(also), told]))
+        kept_text += f"; `calibeam identify {place}` fits them"
+    return PartialResult("; ".join([reason, *dict.fromkeys(also), kept_text]))
 
 
 @contextmanager

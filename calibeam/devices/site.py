@@ -158,7 +158,7 @@ def connected(
 
     @contextmanager
     def read(kept: Kept) -> Generator[Pump]:
-        with _pumped(psd, kept, _spots_beside(psd, addresses.instrument, writer)) as pump:
+        with _pumped(psd, kept, _spots_writer(psd, addresses.instrument, writer)) as pump:
             feed.sees(psd_view(psd, addresses.instrument))
             yield pump
 
@@ -183,7 +183,7 @@ def _wires(
         cleaning.callback(feed.stops_by, None)
         feed.stops_by(partial(supervisor.stop, StoppedError(PAGE_STOP)))  # while connecting, too
         kept = Kept(writer, clock, supervisor, feed)
-        beside = {
+        also = {
             one.device.name: cleaning.enter_context(_pumped(one.device, kept, silence_s=one.silence_s))
             for one in other_drivers(addresses.others, clock)
         }
@@ -200,7 +200,7 @@ def _wires(
             raise
         speeds = Speeds(rig.motion.speed_rad_s, rig.motion.acceleration_rad_s2)
         pumps = Pumps(instrument, pump, encoders)
-        yield gated_arm(arm, rig, pump), pumps, speeds, supervisor, clock, addresses.hurry, beside
+        yield gated_arm(arm, rig, pump), pumps, speeds, supervisor, clock, addresses.hurry, also
 
 
 def _released(arm: Movable) -> None:
@@ -208,7 +208,7 @@ def _released(arm: Movable) -> None:
         arm.close()
 
 
-def _spots_beside(psd: PsdInstrument, device: PsdDevice, writer: RecordingWriter) -> Callable[[Block], None]:
+def _spots_writer(psd: PsdInstrument, device: PsdDevice, writer: RecordingWriter) -> Callable[[Block], None]:
     """Spots of every block as a stream of their own, one sample a block: what a viewer shows without set-up."""
     stream = writer.stream("spots", tuple(Channel(name, "m") for name in SPOTS))
     count = itertools.count()
@@ -232,14 +232,14 @@ def newest_s(pump: Pump) -> float | None:
 
 @contextmanager
 def _pumped(
-    device: Device, kept: Kept, beside: Callable[[Block], None] = lambda block: None, silence_s: float = SILENCE_S
+    device: Device, kept: Kept, also: Callable[[Block], None] = lambda block: None, silence_s: float = SILENCE_S
 ) -> Generator[Pump]:
-    """The device connected, its blocks going into the recording until left, to the live page and to `beside`."""
+    """The device connected, its blocks going into the recording until left, to the live page and to `also`."""
 
     def keep(block: Block) -> None:
         stream.append(block.host_s, block.device_s, block.sequence, block.values)
         kept.feed.heard(device.name, block)
-        beside(block)
+        also(block)
 
     def failed(failure: Exception) -> None:
         kept.supervisor.failed(failure)

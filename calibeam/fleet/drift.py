@@ -79,7 +79,7 @@ FEWEST = 3  # dates: two always lie on a line
 FAMILY = 0.05  # chance that a fleet without drift shows one
 HUBER = 1.345
 NORMAL = 0.7102  # mean square of normal noise cut at HUBER
-BELIEVED = 8.0  # degrees of freedom of a sigma that is known to a quarter of itself
+PRIOR_DOF = 8.0  # degrees of freedom of a sigma that is known to a quarter of itself
 TURNS = 100  # of reweighting; a dozen settle
 SETTLED = 1e-9  # of a weight
 
@@ -124,8 +124,8 @@ def find_drifts_in(found: Sequence[Series]) -> Drifts:
     """Of series with FEWEST different dates or more."""
     scatter = common_scatter(found)
     lines = [fit_line(series, scatter) for series in found]
-    told = holm([one.p for one in lines])
-    judged = [replace(one, significant=said) for one, said in zip(lines, told, strict=True)]
+    significant = holm([one.p for one in lines])
+    judged = [replace(one, significant=said) for one, said in zip(lines, significant, strict=True)]
     return Drifts(tuple(sorted(judged, key=lambda one: one.p)), scatter)
 
 
@@ -148,10 +148,10 @@ def fit_line(series: Series, scatter: float = 1.0) -> Drift:
     inner = float(np.mean(weight >= 1.0))  # share of points within the threshold
     spread = float(np.sum((weight * (wanted - design @ theta)) ** 2)) / dof
     spread *= ((1.0 + 2.0 / n * (1.0 - inner) / inner) / inner) ** 2 if inner else np.inf
-    widened = max(1.0, (BELIEVED + dof * spread) / (BELIEVED + dof))
+    widened = max(1.0, (PRIOR_DOF + dof * spread) / (PRIOR_DOF + dof))
     sigma = float(np.sqrt(widened * np.linalg.inv(design.T @ design)[1, 1]))
-    slope, reach = float(theta[1]), float(special.stdtrit(BELIEVED + dof, 0.975)) * sigma
-    p = 2.0 * float(special.stdtr(BELIEVED + dof, -abs(slope) / sigma))
+    slope, reach = float(theta[1]), float(special.stdtrit(PRIOR_DOF + dof, 0.975)) * sigma
+    p = 2.0 * float(special.stdtr(PRIOR_DOF + dof, -abs(slope) / sigma))
     first = float(theta[0] + theta[1] * (series.year.min() - middle))
     return Drift(series, slope, sigma, slope - reach, slope + reach, first, p)
 

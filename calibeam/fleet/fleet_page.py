@@ -20,7 +20,7 @@ from calibeam.software import SOFTWARE
 from calibrate.quantities import (
     DASH,
     angle,
-    doubted_angle,
+    angle_with_sigma,
     fixed,
     length,
     significant,
@@ -47,7 +47,7 @@ MARKS = ("o", "s", "^", "D", "v", "P", "X")  # beside the colour: joints are sep
 ASIDE = 0.008  # of the span of dates, by which joints stand beside each other so that their bars can be seen
 UNITS = ((1.0, "rad"), (1e-3, "mrad"), (1e-6, "µrad"))
 CELL_IN = 0.34
-DAYS_TOLD = 0.3  # years: over less, a month means too little
+DAYS_BELOW_YEARS = 0.3  # years: over less, a month means too little
 
 
 def over_time(robots: Sequence[tuple[str, Sequence[Series]]], drifting: Sequence[Drift]) -> Html:
@@ -107,7 +107,7 @@ def _paint_robot(axes: Axes, robot: str, series: Sequence[Series], lines: dict[t
 def _date_ticks(axes: Axes, low_year: float, high_year: float) -> None:
     """Three dates, written as long as the span asks for."""
     ticks = np.linspace(low_year, high_year, 3) if high_year > low_year else np.array([low_year])
-    form = "%Y-%m" if high_year - low_year > DAYS_TOLD else "%Y-%m-%d"
+    form = "%Y-%m" if high_year - low_year > DAYS_BELOW_YEARS else "%Y-%m-%d"
     axes.set_xticks(ticks, [datetime.fromtimestamp(float(tick) * YEAR_S, UTC).strftime(form) for tick in ticks])
     axes.set_xlim(low_year - 0.08 * (high_year - low_year), high_year + 0.08 * (high_year - low_year))
 
@@ -237,7 +237,7 @@ def _drift(fleet: Fleet) -> Html | None:
             d.series.robot,
             f"J{d.series.joint}",
             str(d.series.dates),
-            doubted_angle(d.slope_rad_year, d.sigma_rad_year),
+            angle_with_sigma(d.slope_rad_year, d.sigma_rad_year),
             f"{angle(d.low_rad_year, 2)} to {angle(d.high_rad_year, 2)}",
             angle(d.change_rad, 2),
             significant(d.p, 2),
@@ -247,8 +247,8 @@ def _drift(fleet: Fleet) -> Html | None:
     ]
     head = ("Robot", "joint", "dates", "a year, one sigma", "95 % of this line", "first to last", "p", "verdict")
     listed = table(head, rows, numeric=(2, 3, 5, 6))
-    told = (tag("p", method_words(fleet.drifts)), folded("Every line", listed)) if rows else ()
-    return section("drift", CONTENTS["drift"], lead, drawing, *told)
+    details = (tag("p", method_words(fleet.drifts)), folded("Every line", listed)) if rows else ()
+    return section("drift", CONTENTS["drift"], lead, drawing, *details)
 
 
 def _causes(fleet: Fleet) -> Html | None:
@@ -267,10 +267,10 @@ def _causes(fleet: Fleet) -> Html | None:
         f"In how many recordings of each robot each cause was found: {showing} of {len(robots)} robots show one or more"
         f"{f'; the {COLUMNS} with most are drawn' if len(robots) > COLUMNS else ''}.",
     )
-    told = [shared_words(cause) for cause in fleet.shared]
+    causes = [shared_words(cause) for cause in fleet.shared]
     alone = tag("p", "No cause was found on more than one robot.")
     return section(
-        "causes", CONTENTS["causes"], lead, tag("div", drawing, cls="wide"), bullets(told) if told else alone
+        "causes", CONTENTS["causes"], lead, tag("div", drawing, cls="wide"), bullets(causes) if causes else alone
     )
 
 
@@ -328,13 +328,13 @@ def _all(fleet: Fleet) -> Html:
 def _line(row: Row) -> tuple[str, ...]:
     if not row.good:
         return (row.robot or DASH, row.started_utc[:10] or DASH, row.name, row.error)
-    told = sum(zero.value_rad is not None for zero in row.zeros)
+    determined = sum(zero.value_rad is not None for zero in row.zeros)
     return (
         row.robot,
         row.started_utc[:10] or DASH,
         row.name if row.complete else f"{row.name} (cut short or damaged)",
         str(row.samples),
-        f"{told} of {len(row.zeros)}",
+        f"{determined} of {len(row.zeros)}",
         _change(row.held_out_before_m, row.held_out_after_m),
         ", ".join(f"{c.physics} at {c.where}" for c in row.causes) or (row.verdict or DASH),
         fixed(row.seconds, 1),

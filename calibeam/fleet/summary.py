@@ -9,7 +9,7 @@ from functools import cached_property
 
 from calibeam.fleet.drift import Drift, Drifts, find_drifts
 from calibeam.fleet.row import Outcome, Row
-from calibrate.quantities import angle, doubted_angle, significant
+from calibrate.quantities import angle, angle_with_sigma, significant
 
 
 @dataclass(frozen=True)
@@ -123,7 +123,7 @@ class Fleet:
 
 def drift_words(drift: Drift) -> str:
     """One sentence for a person."""
-    slope = doubted_angle(drift.slope_rad_year, drift.sigma_rad_year)
+    slope = angle_with_sigma(drift.slope_rad_year, drift.sigma_rad_year)
     return (
         f"{drift.series.robot}: the zero of joint {drift.series.joint} drifts by {slope} a year "
         f"({angle(drift.change_rad)} over {len(drift.series.year)} recordings, p = {significant(drift.p, 2)})"

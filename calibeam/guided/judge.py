@@ -14,7 +14,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.guided.reading import BarEnd, Cone, Doubt, Reading
+from acquisition.guided.reading import BarEnd, Cone, OffTarget, Reading
 from acquisition.recording import Samples
 from acquisition.recording.rig import Rig, Tolerance
 from acquisition.recording.samples import BAR
@@ -32,7 +32,7 @@ from calibrate.model.dual_psd_rig import assumed_noise
 from calibrate.model.parameters import Parameter, priors, values_by_name
 from calibrate.model.rigid import cross_matrix
 from calibrate.model.sensors import seat
-from calibrate.model.sensors.seat import SEAT_BELIEVED_M
+from calibrate.model.sensors.seat import SEAT_ASSUMED_M
 
 Floats = NDArray[np.float64]
 Visit = tuple[Reading, ...]  # a reading in a cone, or both ends of a bar
@@ -65,8 +65,8 @@ def refit_arm(rig: Rig, visits: Sequence[Visit], values: Mapping[str, float]) ->
     Of two visits that only contradict each other the later one goes.
     """
     kept, dropped = list(visits), list[Visit]()
-    while told := _telling(kept):
-        weighting, parameters, start = _prepared(rig, told, values)
+    while used := _telling(kept):
+        weighting, parameters, start = _prepared(rig, used, values)
         problem = weighting.problem(start).with_parameters(parameters)
         fit = solve(problem, start=start, damping=NEAR_START if values else FAR_START, max_steps=30)
         if not np.all(np.isfinite(fit.covariance)):
@@ -74,13 +74,13 @@ def refit_arm(rig: Rig, visits: Sequence[Visit], values: Mapping[str, float]) ->
         values = {
             p.name: float(v) for p, v in zip(parameters, fit.theta, strict=True) if not p.name.startswith(seat.POINTS)
         }
-        sigmas = _without_itself(problem, weighting, fit.theta, told)
+        sigmas = _without_itself(problem, weighting, fit.theta, used)
         worst = len(sigmas) - 1 - int(np.argmax(sigmas[::-1]))
         if sigmas[worst] <= LIMIT_SIGMAS or len(dropped) == MOST_DROPPED:
             names = tuple(p.name for p in parameters)
             return Refit(values, names, fit.covariance, tuple(kept), tuple(dropped))
-        kept.remove(told[worst])
-        dropped.append(told[worst])
+        kept.remove(used[worst])
+        dropped.append(used[worst])
     return None
 
 
@@ -94,22 +94,22 @@ def _telling(visits: Sequence[Visit]) -> list[Visit]:
 
 
 def _prepared(
-    rig: Rig, told: Sequence[Visit], values: Mapping[str, float]
+    rig: Rig, used: Sequence[Visit], values: Mapping[str, float]
 ) -> tuple[Weighting, tuple[Parameter, ...], Floats]:
-    samples = samples_of([reading for visit in told for reading in visit], rig.n_joints)
+    samples = samples_of([reading for visit in used for reading in visit], rig.n_joints)
     weighting = instruments_for_fit(rig, samples).weighting
     parameters = tuple(assumed_prior(p) for p in weighting.parameters)
     return weighting, parameters, np.array([values.get(p.name, p.start) for p in parameters])
 
 
-def _without_itself(problem: JointProblem, weighting: Weighting, theta: Floats, told: Sequence[Visit]) -> Floats:
+def _without_itself(problem: JointProblem, weighting: Weighting, theta: Floats, used: Sequence[Visit]) -> Floats:
     """(visit,) misfit of each in sigmas of its noise and of a fit without it: r' (I - H)^-1 r, root of."""
-    visit_of = np.repeat(np.arange(len(told)), [len(visit) for visit in told])
+    visit_of = np.repeat(np.arange(len(used)), [len(visit) for visit in used])
     free = np.flatnonzero([p.free for p in problem.parameters])
     jacobian, residual = problem.jacobian(theta)[:, free], problem.residual(theta)
     information = jacobian.T @ jacobian + np.diag(1.0 / priors(problem.parameters)[free] ** 2)
     hat = np.linalg.solve(information, jacobian.T)
-    out, row = np.zeros(len(told)), 0
+    out, row = np.zeros(len(used)), 0
     for measured in weighting.measured:
         width = measured.problem.observed.shape[1]
         for samples in measured.sample_rows:
@@ -149,7 +149,7 @@ class FittedJudge:
         self._rig = msgspec.structs.replace(rig, tolerance=stated)
         self._arm: KinematicModel = with_discs(arm_of(self._rig), self._rig)
         self._point_m = np.array(rig.tool.point_m or (0.0, 0.0, 0.0))
-        self._noise = assumed_noise(rig).joint_rad, rig.noise.seat_m or SEAT_BELIEVED_M
+        self._noise = assumed_noise(rig).joint_rad, rig.noise.seat_m or SEAT_ASSUMED_M
         sigmas = np.array([assumed_prior(p).prior if p.free else 0.0 for p in self._arm.parameters])
         self._values: Mapping[str, float] = {}
         self._theta, self._covariance = np.zeros(len(sigmas)), np.diag(sigmas**2)
@@ -169,7 +169,7 @@ class FittedJudge:
             self._take(fit)
             self.repeatability_m = self._scatter_m()
 
-    def doubt(self, visit: Sequence[Reading]) -> Doubt | None:
+    def off_target(self, visit: Sequence[Reading]) -> OffTarget | None:
         """What the fit has bent towards an earlier slip would reject a good reading: so the one that all others
         speak against is looked for among the earlier ones, too.
         """
@@ -183,7 +183,7 @@ class FittedJudge:
         fit = refit_arm(self._rig, visits_of([*self._learned, *visit]), self._values)
         if fit is not None and not any(dropped[0] is visit[0] for dropped in fit.dropped):
             return None
-        return Doubt(float(np.linalg.norm(miss)), sigmas)
+        return OffTarget(float(np.linalg.norm(miss)), sigmas)
 
     def _take(self, fit: Refit) -> None:
         own = [fit.names.index(p.name) for p in self._arm.parameters]

@@ -31,7 +31,7 @@ Floats = NDArray[np.float64]
 ARRIVED_M = 1e-6  # far below what a person can do
 
 
-class BelievedGuidedArm(RigArm):
+class AssumedGuidedArm(RigArm):
     """Implements acquisition.guided.stillness.GuidedArm."""
 
     def postures(self, start_rad: Floats, point_m: Floats) -> Floats:
@@ -129,7 +129,7 @@ def record_guided(
     """Run the plan. PartialResult when it ended early: what was taken is kept."""
     judge, journal = FittedJudge(rig), GuidedJournal(writer, clock)
     rng = np.random.default_rng(seed)
-    session = GuidedSession(watch, BelievedGuidedArm.of_rig(rig), guide, judge, journal, rng, patience_s=patience_s)
+    session = GuidedSession(watch, AssumedGuidedArm.of_rig(rig), guide, judge, journal, rng, patience_s=patience_s)
     try:
         summary = session.run(plan)
     except Interrupted as why:

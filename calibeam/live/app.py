@@ -36,7 +36,7 @@ from calibeam.live.stopping import ON_THE_WAY, Stop, Viewer, Viewers
 LOOPBACK_NAMES = frozenset({"127.0.0.1", "localhost", "::1"})
 PRESSES = 64  # of STOP at one time, each until the controller has taken it or is known not to
 NO_TOKEN = "This page needs its token: open the whole address that calibeam has printed, ?token=... included.\n"  # noqa: S105 - no password
-ELSEWHERE = "Refused: asked by a page of another site, or under a name that is not this machine's.\n"
+OTHER_SITE = "Refused: asked by a page of another site, or under a name that is not this machine's.\n"
 HEADERS = {
     "Content-Security-Policy": "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self'; "
     "connect-src 'self'; manifest-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'",
@@ -113,7 +113,7 @@ class Guard:
     def _refusal(self, scope: Scope, headers: Headers, query: str) -> Response | None:
         acts = scope["type"] == "websocket" or scope["method"] not in ("GET", "HEAD")
         if not self._rules.is_named(headers) or (acts and not self._rules.is_own(headers)):
-            return PlainTextResponse(ELSEWHERE, 403, HEADERS)
+            return PlainTextResponse(OTHER_SITE, 403, HEADERS)
         if not self._rules.knows(headers, query):
             return PlainTextResponse(NO_TOKEN, 401, HEADERS)
         if self._rules.token is not None and not acts and "token" in parse_qs(query):

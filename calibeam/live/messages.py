@@ -39,7 +39,7 @@ class SceneBeam(Struct, frozen=True):
 
 
 class SceneFixture(Struct, frozen=True):
-    """The fixture in the base: corners (m) of PSD 1, PSD 2. `told`: by the session, else it was guessed."""
+    """The fixture in the base: corners (m) of PSD 1, PSD 2. `known`: by the session, else it was guessed."""
 
     placement: int
     first_psd: int
@@ -69,13 +69,13 @@ class Scene:
 
     def beam(self, T_base_flange: Floats, standing: SceneFixture | None) -> SceneBeam | None:
         """None for a rig without laser and fixture."""
-        if self._believed is None:
+        if self._assumed is None:
             return None
-        origin, direction = (row.tolist() for row in self._believed.arm.beam_from(T_base_flange))
+        origin, direction = (row.tolist() for row in self._assumed.arm.beam_from(T_base_flange))
         laser_m, far_m = _point(origin), _point([o + FREE_BEAM_M * d for o, d in zip(origin, direction, strict=True)])
         if standing is None:
             return SceneBeam([laser_m, far_m], None, both=False, says="")
-        expected_m, light = self._believed.struck(T_base_flange, standing.placement, standing.first_psd)
+        expected_m, light = self._assumed.struck(T_base_flange, standing.placement, standing.first_psd)
         spots_m = [round(value, 9) for value in expected_m.tolist()]
         if light is Light.WRONG_WAY or not all(map(isfinite, spots_m)):
             return SceneBeam([laser_m, far_m], None, both=False, says=light.value)
@@ -85,24 +85,24 @@ class Scene:
         return SceneBeam([laser_m, *ordered_m], spots_m, light is Light.BOTH_LIT, light.value)
 
     def standing(
-        self, told: tuple[int, int] | None, T_base_flange: Floats | None, measured_m: list[float] | None
+        self, known: tuple[int, int] | None, T_base_flange: Floats | None, measured_m: list[float] | None
     ) -> SceneFixture | None:
         """As reported; else the place and order by which the beam would strike nearest to the expected light."""
-        if self._believed is None:
+        if self._assumed is None:
             return None
-        if told is not None and told[0] in self._faces:
-            return SceneFixture(*told, self._corners(told[0]), told=True)
+        if known is not None and known[0] in self._faces:
+            return SceneFixture(*known, self._corners(known[0]), told=True)
         if T_base_flange is None:
             return None
         spots_m = np.zeros(4) if measured_m is None else np.array(measured_m)
-        found = self._nearest(self._believed, T_base_flange, spots_m)
+        found = self._nearest(self._assumed, T_base_flange, spots_m)
         return None if found is None else SceneFixture(*found, self._corners(found[0]), told=False)
 
-    def _nearest(self, believed: AssumedRig, T_base_flange: Floats, spots_m: Floats) -> tuple[int, int] | None:
+    def _nearest(self, assumed: AssumedRig, T_base_flange: Floats, spots_m: Floats) -> tuple[int, int] | None:
         off_m: dict[tuple[int, int], float] = {}
         for placement in self._faces:
             for first in (1, 2):
-                expected_m, light = believed.struck(T_base_flange, placement, first)
+                expected_m, light = assumed.struck(T_base_flange, placement, first)
                 if light is not Light.WRONG_WAY:
                     off_m[placement, first] = float(np.max(np.abs(expected_m - spots_m)))
         near = min(off_m, key=lambda place: off_m[place], default=None)
@@ -116,14 +116,14 @@ class Scene:
     def _rebuild(self) -> None:
         rig, tool, fixture = self._rig, self._rig.tool, self._rig.fixture
         self._arm = RigArm.of_rig(rig, self._corrections)
-        self._believed: AssumedRig | None = None
+        self._assumed: AssumedRig | None = None
         self._faces: dict[int, tuple[Points, Points]] = {}  # by placement: T_base_face of PSD 1, PSD 2, as lists
         self._half_size_m = 0.0 if fixture is None else fixture.half_size_m
         if tool.laser_origin_m is None or tool.laser_direction is None or fixture is None or not rig.placements:
             return
-        believed = self._believed = AssumedRig(rig, self._known())
-        places = {placement: believed.T_base_psd1(placement) for placement in believed.placements}
-        self._faces = {k: (T.tolist(), (T @ believed.T_psd1_psd2).tolist()) for k, T in places.items()}
+        assumed = self._assumed = AssumedRig(rig, self._known())
+        places = {placement: assumed.T_base_psd1(placement) for placement in assumed.placements}
+        self._faces = {k: (T.tolist(), (T @ assumed.T_psd1_psd2).tolist()) for k, T in places.items()}
 
     def _known(self) -> dict[str, float]:
         """Corrections of this rig's parameters: a session may have a place more than its rig file."""

@@ -110,15 +110,15 @@ class Stop:
         """Stop now; blocks until the controller has taken it, or until it is known that it does not."""
         how, host_s = self._how, self._clock.now_s()
         if how is None:
-            return self._told(Stopped(host_s, who, delivered=False, says=NO_ARM))
+            return self._reported(Stopped(host_s, who, delivered=False, says=NO_ARM))
         try:
             how()
         except DeviceError as error:
             says = f"NOT DELIVERED, press the red emergency stop now: {error}"
-            return self._told(Stopped(host_s, who, delivered=False, says=says))
-        return self._told(Stopped(host_s, who, delivered=True, says="the controller confirmed the stop command"))
+            return self._reported(Stopped(host_s, who, delivered=False, says=says))
+        return self._reported(Stopped(host_s, who, delivered=True, says="the controller confirmed the stop command"))
 
-    def _told(self, stopped: Stopped) -> Stopped:
+    def _reported(self, stopped: Stopped) -> Stopped:
         with self._telling:
             if self.last is None or self.last.host_s <= stopped.host_s:
                 self.last = stopped

@@ -47,7 +47,7 @@ class MotionKeys:
         self._between = False
 
     def interrupted(self) -> None:
-        """Ctrl-C; where nothing is under way, the next motion ends before it begins (`beside`)."""
+        """Ctrl-C; where nothing is under way, the next motion ends before it begins (`alongside`)."""
         if self._gate.state in OVER:
             self._between = True
             print("\nnothing moves now, and nothing will: the program ends", file=self._out, flush=True)
@@ -57,12 +57,12 @@ class MotionKeys:
             return
         self._gate.pause()
         if self._held():
-            told = (
+            message = (
                 f"braking along the path, at rest within {self._gate.brake_s:.1f} s; Ctrl-C again gives the motion up"
             )
         else:
-            told = f"resting at the next place within {self._gate.rests_in_s():.1f} s; Ctrl-C again brakes now"
-        print(f"\n{told}", file=self._out, flush=True)
+            message = f"resting at the next place within {self._gate.rests_in_s():.1f} s; Ctrl-C again brakes now"
+        print(f"\n{message}", file=self._out, flush=True)
         self._ask()
 
     def ended(self) -> None:
@@ -70,7 +70,7 @@ class MotionKeys:
         self._between = self._between or self._gate.state in OVER
         self._gate.abort()
 
-    def beside(self, watch: Callable[[], None]) -> Callable[[], None]:
+    def alongside(self, watch: Callable[[], None]) -> Callable[[], None]:
         """`watch`, and InterruptedMotionError in a motion that begins after a key or signal came while none did."""
 
         def both() -> None:
@@ -183,7 +183,7 @@ def move_by_hand(rig: Rig, model: Path | None, asked: Asked, agreement: Agreemen
 def _drive(gate: Gate, made: Plan, joints: Callable[[], Floats], watch: Callable[[], None], console: Console) -> Floats:
     now_rad = joints()
     with keys_of(gate) as keys:
-        followed = gate.run(made, now_rad, watch=keys.beside(watch))
+        followed = gate.run(made, now_rad, watch=keys.alongside(watch))
     end_rad = joints()
     off = float(np.max(np.abs(end_rad - made.q_rad[-1])))
     console.print(

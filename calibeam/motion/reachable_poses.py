@@ -90,10 +90,10 @@ def candidates_of(
 
 
 def _before_detectors(rig: Rig, per_block: int, rng: Generator, progress: Progress) -> Candidates:
-    believed, blocks = AssumedRig(rig), [(place, first) for place in rig.placements for first in (1, 2)]
+    assumed, blocks = AssumedRig(rig), [(place, first) for place in rig.placements for first in (1, 2)]
     q, spots, place_of, first_of = list[Floats](), list[Floats](), list[int](), list[int]()
     for done, (place, first) in enumerate(blocks):
-        for pose, seen in _landed(rig, believed, place, first, per_block, rng):
+        for pose, seen in _landed(rig, assumed, place, first, per_block, rng):
             q.append(pose)
             spots.append(seen)
             place_of.append(place)
@@ -105,21 +105,21 @@ def _before_detectors(rig: Rig, per_block: int, rng: Generator, progress: Progre
 
 
 def _landed(
-    rig: Rig, believed: AssumedRig, place: int, first: int, wanted: int, rng: Generator
+    rig: Rig, assumed: AssumedRig, place: int, first: int, wanted: int, rng: Generator
 ) -> list[tuple[Floats, Floats]]:
-    options, solver, half_m = PlanOptions(), solver_of(rig), believed.fixture.half_size_m
-    home, T = np.array(rig.motion.home_rad or np.zeros(rig.n_joints)), believed.T_base_psd1(place)
+    options, solver, half_m = PlanOptions(), solver_of(rig), assumed.fixture.half_size_m
+    home, T = np.array(rig.motion.home_rad or np.zeros(rig.n_joints)), assumed.T_base_psd1(place)
     edge_m, out = options.face_share * half_m, list[tuple[Floats, Floats]]()
     for tried in range(TRIES * wanted):
         if len(out) >= wanted or (tried == FUTILE and not out):
             break
         x1, y1, x2, y2 = rng.uniform(-edge_m, edge_m, 4).tolist()
         stand_off, roll = float(rng.uniform(*options.stand_off_m)), float(rng.uniform(-np.pi, np.pi))
-        flange = flange_for(believed.arm, believed.fixture, T, BeamTarget(first, (x1, y1, x2, y2), stand_off, roll))
+        flange = flange_for(assumed.arm, assumed.fixture, T, BeamTarget(first, (x1, y1, x2, y2), stand_off, roll))
         found = all_solutions(solver.arm, flange, home, solver.starts, rng)
         for q_rad in rng.permutation(found)[:BRANCHES]:
-            seen = believed.expect(q_rad, place, first)
-            if seen.light is Light.BOTH_LIT and clear_of_table(believed.arm, q_rad) and _clear(rig, q_rad[None])[0]:
+            seen = assumed.expect(q_rad, place, first)
+            if seen.light is Light.BOTH_LIT and clear_of_table(assumed.arm, q_rad) and _clear(rig, q_rad[None])[0]:
                 out.append((q_rad, seen.spots_m))
     return out[:wanted]
 

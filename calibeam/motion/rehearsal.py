@@ -58,11 +58,11 @@ class Rehearsal:
     def says(self) -> str:
         """For a person, the first refused pose with its reason."""
         places = len({stop.placement for stop in self.stops})
-        told = f"{len(self.stops)} poses at {places} station{'' if places == 1 else 's'}"
+        summary = f"{len(self.stops)} poses at {places} station{'' if places == 1 else 's'}"
         if not self.refused:
-            return f"{told}, all within reach and clear of the keep-out boxes"
+            return f"{summary}, all within reach and clear of the keep-out boxes"
         first = self.refused[0]
-        return f"{told}, {len(self.refused)} of them are not possible, the first: {first.name}: {first.why}"
+        return f"{summary}, {len(self.refused)} of them are not possible, the first: {first.name}: {first.why}"
 
 
 @dataclass

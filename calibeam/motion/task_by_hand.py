@@ -30,7 +30,7 @@ from calibeam.console import Console
 from calibeam.motion.by_hand import draw_plan_file, keys_of, said
 from calibeam.motion.gate_of_rig import UR_STREAM_HZ, cell_of, gate_of, solver_of
 from calibeam.motion.robot import streamed_robot, watched_joints
-from calibeam.motion.task_devices import beside
+from calibeam.motion.task_devices import open_task_devices
 from drivers.clock import SystemClock
 
 Floats = NDArray[np.float64]
@@ -143,8 +143,8 @@ def run_by_hand(
             return
         if asking is not None:
             asking.may_move()
-        with beside(task, file.parent, rig, robot, clock) as devices, keys_of(gate) as keys:
-            watch = keys.beside(robot.supervisor.check)
+        with open_task_devices(task, file.parent, rig, robot, clock) as devices, keys_of(gate) as keys:
+            watch = keys.alongside(robot.supervisor.check)
             around = Around(robot.joints, devices.read, devices.act, devices.belt, watch, plans.show)
             ran = run_task(gate, task, around)
     (_, q_rad), host_s = robot.track.joints(), robot.track.host_s()

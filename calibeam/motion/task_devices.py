@@ -132,7 +132,7 @@ def part_in_file(path: Path) -> Floats:
 
 
 @contextmanager
-def beside(task: Task, folder: Path, rig: Rig, robot: StreamedRobot, clock: Clock) -> Generator[TaskDevices]:
+def open_task_devices(task: Task, folder: Path, rig: Rig, robot: StreamedRobot, clock: Clock) -> Generator[TaskDevices]:
     """Connected while inside; files of READ are beside the task file, in `folder`. DeviceError, TaskError."""
     with ExitStack() as stack:
         act = no_hand if task.hand is None else _hand(task.hand, rig, robot, stack)

@@ -201,12 +201,12 @@ class Model:
         return f"<p><b>{escape(self.says)}</b></p><ul>{reasons}</ul><table>{head}{rows}</table>{rest}"
 
     def __str__(self) -> str:
-        from calibrate.quantities import doubted_angle
+        from calibrate.quantities import angle_with_sigma
 
         lines = [self.says, *(f"  {reason}" for reason in self.reasons)]
         for joint, (zero, sigma) in self.zeros().items():
-            told = "not determined" if zero is None or sigma is None else doubted_angle(zero, sigma)
-            lines.append(f"joint {joint} zero: {told}")
+            value_text = "not determined" if zero is None or sigma is None else angle_with_sigma(zero, sigma)
+            lines.append(f"joint {joint} zero: {value_text}")
         return "\n".join(lines)
 
 

@@ -18,7 +18,7 @@ from calibrate.compare.comparison_file import (
     StreamRecord,
     in_words,
 )
-from calibrate.compare.link_differs import Parted
+from calibrate.compare.link_differs import JudgedLink
 from calibrate.compare.reconciled_rows import ReconcileFile
 from calibrate.compare.rig_and_streams import SAYS
 from calibrate.model.effects.term import Size, with_sigma
@@ -121,7 +121,7 @@ def _rows(file: ComparisonFile) -> str:
     return f"{file.matched} samples in both" + "".join(f", {text}" for text in alone)
 
 
-def _chain(links: tuple[Parted, ...]) -> Table:
+def _chain(links: tuple[JudgedLink, ...]) -> Table:
     table = Table(title="settled samples, link by link", title_justify="left")
     for heading in ("link", "differ by (rms)", "of its own", "at most", "in", "noise", "found", "parts"):
         table.add_column(heading, justify="left" if heading in ("link", "in", "parts") else "right")

@@ -25,14 +25,14 @@ def print_fleet(console: Console, ran: RunResult, fleet: Fleet) -> None:
     console.print(table)
     if len(fleet.robots) > SHOWN:
         console.print(f"and {counted(len(fleet.robots) - SHOWN, 'more robot')}")
-    told = [drift_words(drift) for drift in fleet.drifting] + [f"shared: {shared_words(c)}" for c in fleet.shared]
+    lines = [drift_words(drift) for drift in fleet.drifting] + [f"shared: {shared_words(c)}" for c in fleet.shared]
     if not fleet.drifting:
         untested = "drift is not determined: no zero was determined on three dates"
-        told.insert(0, f"no zero drifts significantly ({len(fleet.lines)} tested)" if fleet.lines else untested)
-    told += [f"{row.outcome.value}: {row.name}: {row.error}" for row in fleet.bad[:SHOWN]]
+        lines.insert(0, f"no zero drifts significantly ({len(fleet.lines)} tested)" if fleet.lines else untested)
+    lines += [f"{row.outcome.value}: {row.name}: {row.error}" for row in fleet.bad[:SHOWN]]
     if len(fleet.bad) > SHOWN:
-        told.append(f"and {len(fleet.bad) - SHOWN} more failed")
-    for line in told:
+        lines.append(f"and {len(fleet.bad) - SHOWN} more failed")
+    for line in lines:
         console.print(line, markup=False, highlight=False, soft_wrap=True)
     console.print(_counts(ran, fleet), markup=False, highlight=False)
 

@@ -11,7 +11,7 @@ from rich.table import Table
 from calibeam.console import Console
 from calibrate.apply.export import cells, nominal_table
 from calibrate.fit.fit_plan import ZEROS_ONLY_COMMAND
-from calibrate.fit.identify.estimates import ONLY_BELIEVED, JointZero
+from calibrate.fit.identify.estimates import ONLY_ASSUMED, JointZero
 from calibrate.fit.identify.point_constraint import PointConstraints
 from calibrate.fit.identify.record import parameter_records
 from calibrate.fit.identify.result import (
@@ -194,8 +194,8 @@ IN_RAD = {kind.name for kind in SENSORS if kind.quantities[0].unit == "rad"}
 
 def _print_details(console: Console, result: Identification, *, of_spots: bool) -> None:
     """What was wrong with the file comes first, since all that follows is without these rows."""
-    for blunder in result.blunders:
-        console.print(f"left out: {blunder.says}", highlight=False, markup=False)
+    for gross_error in result.blunders:
+        console.print(f"left out: {gross_error.says}", highlight=False, markup=False)
     for alarm in result.alarms:
         console.print(f"ALARM: {alarm}", style="bold red", highlight=False, markup=False)
     seen = result.identifiability
@@ -208,10 +208,10 @@ def _print_details(console: Console, result: Identification, *, of_spots: bool) 
     for combination in seen.combinations:
         about = "" if len(combination.members) > 1 else f"{combination.words}: "
         console.print(f"  {about}{combination.says}", highlight=False, markup=False)
-    believed = [e.name for e in result.estimates if e.why is not None and e.why.startswith(ONLY_BELIEVED)]
-    if believed:
+    assumed = [e.name for e in result.estimates if e.why is not None and e.why.startswith(ONLY_ASSUMED)]
+    if assumed:
         console.print(
-            f"  determined by the assumed tolerances only: {', '.join(believed)}", highlight=False, markup=False
+            f"  determined by the assumed tolerances only: {', '.join(assumed)}", highlight=False, markup=False
         )
     if of_spots:
         _print_zeros(console, result.zeros)
@@ -331,8 +331,8 @@ def _figures(result: Identification) -> list[str]:
     ]
     for noise in result.noise:
         unit = "µrad" if noise.source in ("joint", *IN_RAD) else "µm"
-        found, believed = f"{1e6 * noise.found:.3g} {unit}", f"{1e6 * noise.believed:.3g} {unit}"
-        out.append(f"noise of {noise.source}: {found} found, {believed} stated")
+        found, assumed = f"{1e6 * noise.found:.3g} {unit}", f"{1e6 * noise.assumed:.3g} {unit}"
+        out.append(f"noise of {noise.source}: {found} found, {assumed} stated")
     stated = result.stated_noise
     if np.isfinite(stated.p_above):
         out.append(f"chi-square under the noise as stated: {stated.chi2:.4g} at {stated.dof} degrees of freedom")

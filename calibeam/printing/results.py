@@ -45,7 +45,7 @@ FEW, CAUSES, RIVALS = 2, 3, 1  # of a kind, of causes, of other names for one
 
 def _brief(file: DiagnosisFile) -> Iterator[str]:
     """Causes with their best alternative, what is unexplained, unseen rows before and after, what to do next."""
-    yield from _few([f"fault of the file: {blunder.says}" for blunder in file.blunders])
+    yield from _few([f"fault of the file: {gross_error.says}" for gross_error in file.blunders])
     for number, finding in enumerate(file.findings[:CAUSES], start=1):
         yield from list(_finding(number, finding))[: 2 + RIVALS]
     if len(file.findings) > CAUSES:
@@ -94,8 +94,8 @@ def _few(lines: list[str]) -> Iterator[str]:
 
 def _print_details(console: Console, file: DiagnosisFile) -> None:
     """Everything; the figures are in the report."""
-    for blunder in file.blunders:
-        console.print(f"fault of the file: {blunder.says}", highlight=False, markup=False)
+    for gross_error in file.blunders:
+        console.print(f"fault of the file: {gross_error.says}", highlight=False, markup=False)
     for number, finding in enumerate(file.findings, start=1):
         for line in _finding(number, finding):
             console.print(line, highlight=False, markup=False)
@@ -103,7 +103,7 @@ def _print_details(console: Console, file: DiagnosisFile) -> None:
         console.print(line, highlight=False, markup=False)
     for line in noise_words(file):
         console.print(f"noise: {line}", highlight=False, markup=False)
-    for line in _doubt(file):
+    for line in _reasons_for_care(file):
         console.print(line, highlight=False, markup=False)
     if file.splits:
         console.print(_proof(file))
@@ -157,7 +157,7 @@ def _changes(file: DiagnosisFile) -> Iterator[str]:
         yield f"not applied, true of another recording only: {', '.join(file.known.left_out)}"
 
 
-def _doubt(file: DiagnosisFile) -> Iterator[str]:
+def _reasons_for_care(file: DiagnosisFile) -> Iterator[str]:
     for one in (u for u in (file.unexplained, *file.also_unexplained) if u is not None):
         where = f" at {one.where}" if one.where else ""
         yield f"unexplained{where}: {one.says}"

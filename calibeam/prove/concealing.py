@@ -84,7 +84,7 @@ def fault_records(faults: tuple[StreamFault, ...]) -> list[dict[str, Any]]:
 def _write(case: Case, session: StreamedSession, path: Path) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     path.unlink(missing_ok=True)
-    text = toml_text(rig_document(case.belief))
+    text = toml_text(rig_document(case.stated))
     with RecordingWriter(path, rig_text=text, software=SOFTWARE, clock=_HostTime(), host_s0=HOST_S) as writer:
         for row in _rows(case, session):
             writer.sample(row, HOST_S + float(row["t_s"]))
@@ -242,5 +242,5 @@ def _drawn(order: _Order) -> tuple[Scenario, Case, Case | None, int]:
 def write_recording(case: Case, folder: Path) -> None:
     """The recording alone: nothing else of a case is ever written in clear before all are diagnosed."""
     folder.mkdir(parents=True, exist_ok=True)
-    (folder / "rig.toml").write_text(toml_text(rig_document(case.belief)), encoding="utf-8")
+    (folder / "rig.toml").write_text(toml_text(rig_document(case.stated)), encoding="utf-8")
     (folder / "samples.csv").write_text(csv_text(columns(case)), encoding="utf-8", newline="")

@@ -82,16 +82,16 @@ def prove_loop(out: Path, cases: int, wired: int, seed: int, jobs: int, tell: Te
             for error in pool.map(reconciled, repeat(layout), names, map(layout.answer, names)):
                 errors.append(error)
                 count(f"reconciled {len(errors)} of {total}")
-        told = [_told(layout, one, error) for one, error in zip(concealed, errors, strict=True)]
-    told.sort(key=lambda one: (not one.failure, one.name))
-    file = LoopFile(1, "calibeam-loop", SOFTWARE, seed, published, tuple(told))
+        loop_cases = [_loop_case(layout, one, error) for one, error in zip(concealed, errors, strict=True)]
+    loop_cases.sort(key=lambda one: (not one.failure, one.name))
+    file = LoopFile(1, "calibeam-loop", SOFTWARE, seed, published, tuple(loop_cases))
     (out / "loop.json").write_bytes(msgspec.json.format(msgspec.json.encode(file), indent=1) + b"\n")
     text = "".join(f"{line}\n" for line in summary(file.cases)) + "\n" + table_text(file.cases)
     (out / "loop.md").write_text(text, encoding="utf-8")
     return file
 
 
-def _told(layout: Layout, one: Concealed, error: str) -> LoopCase:
+def _loop_case(layout: Layout, one: Concealed, error: str) -> LoopCase:
     """With the seal open."""
     name, kind, family, path = one.scenario.name, one.scenario.kind, one.scenario.wanted.family, one.scenario.path
     truth = truth_of(open_seal(layout.seal(name).read_bytes(), one.key, one.sha256))

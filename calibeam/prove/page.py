@@ -80,8 +80,8 @@ def _faulty(cases: Sequence[CaseScore]) -> str:
 SINGLE = ("one", "disturbed", "outside", "streams")
 NOTHING = "nothing"
 FAILED = "failed"
-ELSEWHERE = "right name, elsewhere"
-LAST = (UNKNOWN, NOTHING, ELSEWHERE, FAILED)
+OTHER_PLACE = "right name, elsewhere"
+LAST = (UNKNOWN, NOTHING, OTHER_PLACE, FAILED)
 CELL_IN = 0.27
 MARGIN_IN = 2.2
 
@@ -109,7 +109,7 @@ def _said(case: CaseScore) -> str:
     if not case.said:
         return UNKNOWN if case.unexplained else NOTHING
     first = case.said[0].physics
-    return ELSEWHERE if case.defects and first == case.defects[0].physics else first
+    return OTHER_PLACE if case.defects and first == case.defects[0].physics else first
 
 
 def _ordered(words: set[str]) -> list[str]:
@@ -172,7 +172,7 @@ def proof_html(proof: ProofFile) -> str:
     chapters = [
         _short(cases),
         _sums(cases),
-        _doubt(cases),
+        _uncertainty(cases),
         _confusion(cases),
         _stories(cases),
         _repeat(proof),
@@ -214,7 +214,7 @@ def _sums(cases: Sequence[CaseScore]) -> Html:
     )
 
 
-def _doubt(cases: Sequence[CaseScore]) -> Html:
+def _uncertainty(cases: Sequence[CaseScore]) -> Html:
     lead = "What is reported where nothing is hidden, and how sizes and errors compare with the truth."
     said = table(("", "measured", "wanted"), [(f.label, f.said, f.wanted) for f in figures(cases) if f.said != NONE])
     return section("doubt", CONTENTS["doubt"], lead, said)

@@ -90,7 +90,7 @@ def same_name(true: str, said: str, why: str) -> bool:
 Floats = NDArray[np.float64]
 
 CHANNELS: dict[str, tuple[str, ...]] = {"dual-psd": SPOTS, "tracker": POSITION, "wire": ("wire_m",)}
-WILD = 6.0  # sigmas: rows that every side of the comparison leaves out
+OUTLIER_SIGMAS = 6.0  # sigmas: rows that every side of the comparison leaves out
 
 
 def noise_m(samples: Samples, truth: Truth, family: str) -> Floats:
@@ -110,7 +110,7 @@ def floor_m(samples: Samples, truth: Truth, family: str) -> float | None:
         return None
     noise = noise_m(samples, truth, family)
     size = np.max(np.abs(noise), axis=1)
-    return float(np.sqrt(np.mean(noise[size <= WILD * sigma_about_zero(noise)] ** 2)))
+    return float(np.sqrt(np.mean(noise[size <= OUTLIER_SIGMAS * sigma_about_zero(noise)] ** 2)))
 
 
 REACH_M = (0.08, 0.45)  # along a beam: from the nearest to the farthest detector of a session
@@ -383,9 +383,9 @@ def _asks_for(file: DiagnosisFile, truth: Truth, defects: tuple[DefectScore, ...
         return False
     if all(d.named for d in defects):
         return True
-    doubts = file.verdict == "undecidable" or file.unexplained is not None
-    told = [n.column for n in file.not_recorded] + list(file.next)
-    return doubts and any(_stem(column) in text for column in truth.withheld for text in told)
+    undecided = file.verdict == "undecidable" or file.unexplained is not None
+    advised = [n.column for n in file.not_recorded] + list(file.next)
+    return undecided and any(_stem(column) in text for column in truth.withheld for text in advised)
 
 
 def _stem(column: str) -> str:

@@ -24,7 +24,7 @@ from calibrate.diagnose.record.schema import (
 from calibrate.diagnose.record.to_file import file_of
 from calibrate.diagnose.stages import Stage, Stages
 from calibrate.diagnose.streams import streams_of, with_streams
-from calibrate.diagnose.with_model import beside_known, known_before, only_new
+from calibrate.diagnose.with_model import known_before, only_new, with_known_model
 from calibrate.errors import DataError
 from calibrate.model.model_file import ModelFile, read_model
 from calibrate.model.sensors.catalogue import unused_columns
@@ -101,8 +101,8 @@ def _diagnosed(
     found = diagnose_samples(recording.rig, recording.samples, rng, known.begin, begun=begun)
     if known.same_recording:
         found = only_new(found)  # what its streams show is no part of a model, and not new either
-        return found, beside_known(file_of(found, recording), known, found)
-    return found, _with_streams(beside_known(file_of(found, recording), known, found), recording, found)
+        return found, with_known_model(file_of(found, recording), known, found)
+    return found, _with_streams(with_known_model(file_of(found, recording), known, found), recording, found)
 
 
 def _with_streams(file: DiagnosisFile, recording: Recording, found: Diagnosed) -> DiagnosisFile:

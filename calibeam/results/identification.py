@@ -99,11 +99,11 @@ def identify_session(
 def session_model(result: Identification, recording: Recording, planned: Planned | None = None) -> ModelFile:
     """What model.json holds, with the rig in it."""
     text, rig = recording.rig_text, recording.rig
-    told = Planned() if planned is None else planned
-    arm_model = (told.plan.model or rig.arm.model).value
+    plan_used = Planned() if planned is None else planned
+    arm_model = (plan_used.plan.model or rig.arm.model).value
     identity, samples = RigIdentity(rig.name, rig_sha256(text), text), recording.samples
     hashes = {"readings_sha256": readings_sha256(samples), "measured_sha256": measured_sha256(samples)}
-    model = msgspec.structs.replace(record_of(result, identity, arm_model, told.text), **hashes)
+    model = msgspec.structs.replace(record_of(result, identity, arm_model, plan_used.text), **hashes)
     if arm_model == ArmModel.LOCAL_POE.value and model.covariance is not None:
         in_model = rig_in_model(rig, ArmModel.LOCAL_POE)
         found = dh_table_of(in_model, model, result.parameters, result.identifiability)

@@ -99,14 +99,14 @@ def reconcile(measured: Recording, simulation: Recording | str, name: str, *, se
     if isinstance(simulation, Recording):
         plain = _geometry_alone(measured, simulated, seen)
     after = compare(measured, _as_recording(measured, replayed.samples, "simulated.mcap"), SOFTWARE)
-    told, rows = on_unseen_rows(
+    unseen_records, rows = on_unseen_rows(
         measured.samples,
         (set_alike_by(measured, simulated, seen), plain, replayed.exact),
         unseen,
         diagnosis,
         stated_m_of(measured.rig),
     )
-    remains = tuple(what_remains(told, rows, diagnosis, after))
+    remains = tuple(what_remains(unseen_records, rows, diagnosis, after))
     agrees = not remains
     file = ReconcileFile(
         1,
@@ -115,11 +115,11 @@ def reconcile(measured: Recording, simulation: Recording | str, name: str, *, se
         measured.path.name,
         name,
         "agree" if agrees else "differ",
-        verdict_text(told, before, remains),
+        verdict_text(unseen_records, before, remains),
         seed,
         len(seen),
         tuple(unseen.tolist()),
-        told,
+        unseen_records,
         rows,
         tuple(what_was_left_out(before, diagnosis, isinstance(simulation, Recording))),
         remains,
@@ -163,8 +163,8 @@ def _sides(
     here = replace(measured, events=())
     drawn = replace(here, rig=parse_rig(simulation, name), rig_text=simulation)
     part = replace(drawn, samples=here.samples.take(seen) if enough(seen, unseen) else here.samples)
-    told = Planned(FitPlan(schema=1, hold=_stated(part), share=0.0, splits=()))
-    model = session_model(identify_session(part, told), part, told)
+    plan_used = Planned(FitPlan(schema=1, hold=_stated(part), share=0.0, splits=()))
+    model = session_model(identify_session(part, plan_used), part, plan_used)
     exact = replay(drawn, model, noisy=False).exact
     return here, _as_recording(drawn, exact, name), seen, unseen
 

@@ -131,8 +131,8 @@ def reading_columns(samples: Samples) -> tuple[str, ...]:
     """Columns of instruments in the samples, in their order; what is stated of a reading beside it is an input."""
     instruments = {name for kind in SENSORS for name in (*kind.columns, *kind.reads)} - {*INPUTS, BAR_END}
     instruments |= set(per_joint("enc", "_rad", samples.n_joints))
-    beside = ("_sum_v", "_sigma_m")  # of a detector: light and scatter, which no simulation is asked for
-    return tuple(n for n in samples.names if n in instruments and not n.endswith(beside))
+    not_simulated = ("_sum_v", "_sigma_m")  # of a detector: light and scatter, which no simulation is asked for
+    return tuple(n for n in samples.names if n in instruments and not n.endswith(not_simulated))
 
 
 def inputs_of(samples: Samples) -> tuple[str, ...]:

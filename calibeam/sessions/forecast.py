@@ -57,15 +57,15 @@ class Ahead:
 
 def ahead_of_blocks(rig: Rig, blocks: Sequence[Block]) -> Ahead:
     """Of a session that aims; repeats stand where their first pose stands."""
-    believed, rng = AssumedRig(rig), np.random.default_rng(SEED)
+    assumed, rng = AssumedRig(rig), np.random.default_rng(SEED)
     near_rad = np.array(rig.motion.home_rad)
     found: dict[PoseKey, tuple[Floats, Floats]] = {}
     for block in blocks:
-        T = believed.T_base_psd1(block.placement)
+        T = assumed.T_base_psd1(block.placement)
         for visit in block.visits:
-            flange = flange_for(believed.arm, believed.fixture, T, visit.target)
+            flange = flange_for(assumed.arm, assumed.fixture, T, visit.target)
             try:
-                near_rad = reach(believed.arm, flange, near_rad, rng)
+                near_rad = reach(assumed.arm, flange, near_rad, rng)
             except UnreachableError:
                 continue
             for again in range(1 if visit.repeat is None else 3):
@@ -76,13 +76,13 @@ def ahead_of_blocks(rig: Rig, blocks: Sequence[Block]) -> Ahead:
 
 def ahead_of_plan(rig: Rig, plan: PosePlan) -> Ahead:
     """Of a plan of joint poses."""
-    believed = AssumedRig(rig)
+    assumed = AssumedRig(rig)
     each = [(block, pose) for block in plan.block for pose in block.pose]
     keys = tuple(PoseKey(block.placement or 0, block.first_psd or 1, k) for k, (block, _) in enumerate(each))
     found: list[tuple[Floats, Floats]] = []
     for key, (_, pose) in zip(keys, each, strict=True):
         q_rad = np.array(pose.q_rad)
-        spots = believed.expect(q_rad, key.placement, key.first).spots_m if pose.spots_m is None else pose.spots_m
+        spots = assumed.expect(q_rad, key.placement, key.first).spots_m if pose.spots_m is None else pose.spots_m
         found.append((q_rad, np.array(spots)))
     return Ahead(_poses(found, keys, rig.n_joints), keys)
 
@@ -109,12 +109,12 @@ def forecast(rig: Rig, taken: list[Sample], ahead: Candidates, goal_m: float) ->
         fitted = _fitted(rig, rows.take(np.arange(len(taken))))
         if fitted.fit.status is Status.NOT_FINITE or not np.all(np.isfinite(fitted.fit.theta)):
             return replace(nothing, why="the fit of these poses does not converge")
-        return _told(rig, rows, fitted, nothing)
+        return _forecast(rig, rows, fitted, nothing)
     except np.linalg.LinAlgError:
         return replace(nothing, why="these poses are too few, or too alike")
 
 
-def _told(rig: Rig, rows: Samples, fitted: SettledFit, nothing: Forecast) -> Forecast:
+def _forecast(rig: Rig, rows: Samples, fitted: SettledFit, nothing: Forecast) -> Forecast:
     """The numbers, or why there is none."""
     names = {p.name: float(v) for p, v in zip(fitted.fit.parameters, fitted.fit.theta, strict=True)}
     found, seen, felt_m = _information(rig, rows, names, fitted.factors, nothing.samples)

@@ -81,14 +81,14 @@ def _of_parts(each: Sequence[Recording], folder: Path, rig: Rig) -> EarlierParts
 
 def _taken(one: Recording) -> dict[PoseKey, Sample]:
     """A sample whose event was not written any more, because the process was killed, is taken once more."""
-    told = [event.detail.get("pose") for event in one.events if event.kind == "sample"]
+    recorded = [event.detail.get("pose") for event in one.events if event.kind == "sample"]
     rows = [sample_of(row, one.samples.n_joints) for row in one.samples.rows()]
-    if len(one.samples) and not any(told):
+    if len(one.samples) and not any(recorded):
         raise RecordingError(
             f"{one.path}: recorded by an earlier version, which did not record the pose of each sample; begin a new "
             "session"
         )
-    return {PoseKey(**pose): row for pose, row in zip(told, rows, strict=False) if pose is not None}
+    return {PoseKey(**pose): row for pose, row in zip(recorded, rows, strict=False) if pose is not None}
 
 
 TEXT = """
@@ -249,8 +249,8 @@ def notes_of(job: Job, seed: int) -> dict[str, str]:
 def _check_same_plan(job: Job, earlier: EarlierParts) -> None:
     if not earlier.begun:
         return
-    told, begun = (plan_sha256(job.plan_text) if job.plan is not None else None), earlier.notes.get(PLAN_NOTE)
-    if told != begun:
+    plan_hash, begun = (plan_sha256(job.plan_text) if job.plan is not None else None), earlier.notes.get(PLAN_NOTE)
+    if plan_hash != begun:
         raise AcquisitionError(
             f"{job.out}: the session was begun {'without a plan' if begun is None else 'with another --plan'}; "
             f"go on with it {'without --plan' if begun is None else 'with the same'}"

@@ -159,7 +159,7 @@ class Keys:
                     if number == END:
                         return
                     if not (frozen and number == signal.SIGCONT):
-                        self._told(number)
+                        self._on_signal(number)
             # What was typed during a freeze is discarded; the terminal that was ready is empty then.
             if self._terminal in ready and not frozen and not self._read(self._terminal):
                 sources.remove(self._terminal)
@@ -198,7 +198,7 @@ class Keys:
             with suppress(termios.error):
                 termios.tcflush(self._terminal, termios.TCIFLUSH)
 
-    def _told(self, number: int) -> None:
+    def _on_signal(self, number: int) -> None:
         if number in ENDED_BY:
             if number == signal.SIGHUP:
                 INTERRUPTS.leave_terminal()

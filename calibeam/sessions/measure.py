@@ -44,12 +44,12 @@ class Measuring:
         bench: WiredBench,
         writer: RecordingWriter,
         clock: Clock,
-        told: tuple[StatusReporter, Person],
+        people: tuple[StatusReporter, Person],
         sight: Sight | None = None,
     ) -> None:
         self._job, self._part, self._ahead = job, part, ahead
         self._bench, self._writer, self._clock = bench, writer, clock
-        self._reporter, self._person = told
+        self._reporter, self._person = people
         self._samples: list[Sample] = []
         self._forecaster = Forecaster(self._forecast, self._no_forecast)
         self._control = control_of(
@@ -121,10 +121,10 @@ class Measuring:
 
 @contextmanager
 def measuring(
-    job: Job, part: Part, ahead: Ahead, path: Path, clock: Clock, told: tuple[StatusReporter, Person], feed: Feed
+    job: Job, part: Part, ahead: Ahead, path: Path, clock: Clock, people: tuple[StatusReporter, Person], feed: Feed
 ) -> Generator[Measuring]:
     """Devices connected, the recording begun. DeviceError, RecordingError, and what `camera_sight` raises."""
-    mover = partial(_asked_for, part, told[1]) if job.place is None else partial(_emulated, part, job.place)
+    mover = partial(_asked_for, part, people[1]) if job.place is None else partial(_emulated, part, job.place)
     with (
         new_recording(path, part.text, clock, notes_of(job, part.seed)) as writer,
         camera_sight(part.rig, clock) as sight,
@@ -134,7 +134,7 @@ def measuring(
         for place in part.earlier.added:
             instead_of = next((k for k, v in part.earlier.stands_in.items() if v == place.id), None)
             writer.event(Event(clock.now_s(), STANDS_IN, {"id": place.id, "instead_of": instead_of}))
-        yield Measuring(job, part, ahead, bench, writer, clock, told, sight)
+        yield Measuring(job, part, ahead, bench, writer, clock, people, sight)
 
 
 def control_of(

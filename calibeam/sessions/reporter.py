@@ -75,8 +75,8 @@ class StatusReporter:
         """From the run control: the arm could not be stopped; None: now it was, or it need not be."""
         with self._turn:
             self._now(undelivered="" if trouble is None else str(trouble))
-            told = "no stop is outstanding any more" if trouble is None else f"{UNDELIVERED.upper()}: {trouble}"
-            self.report(told)
+            message = "no stop is outstanding any more" if trouble is None else f"{UNDELIVERED.upper()}: {trouble}"
+            self.report(message)
 
     def pausing(self, rests_in_s: float, eased_s: float | None) -> None:
         """From the run control: when the arm rests (s, at most); `eased_s`: braked softly for that, in this time."""

@@ -29,7 +29,7 @@ class PlainView:
 
     def __init__(self, console: Console) -> None:
         self._console = console
-        self._told, self._step = 0, ""
+        self._reported, self._step = 0, ""
 
     def report(self, text: str, on_screen: bool) -> None:
         if on_screen:
@@ -40,9 +40,9 @@ class PlainView:
             self._step = shown.step
             self.report(shown.step, on_screen=True)
         progress = shown.progress
-        if progress is None or progress.done < self._told + EVERY:
+        if progress is None or progress.done < self._reported + EVERY:
             return
-        self._told = progress.done
+        self._reported = progress.done
         left = "" if shown.left_s is None else f", about {clock_words(shown.left_s)} left"
         accuracy = "" if shown.forecast is None else f"; accuracy {shown.forecast.says}"
         self.report(f"{progress.done} of {progress.total} poses{left}{accuracy}", on_screen=True)
@@ -205,8 +205,8 @@ def _quality(table: Table, quality: Quality) -> None:
     half = (len(spans) + 1) // 2
     for row in range(half):
         pair = [j for j in (row, row + half) if j < len(spans)]
-        told = "  ".join(f"{j + 1} {quality.marks[j]:{longest}} {spans[j]:4.0f}°" for j in pair)
-        table.add_row("   joints" if row == 0 else "", told)
+        joints = "  ".join(f"{j + 1} {quality.marks[j]:{longest}} {spans[j]:4.0f}°" for j in pair)
+        table.add_row("   joints" if row == 0 else "", joints)
 
 
 def _soon(seconds: float) -> str:

@@ -86,8 +86,8 @@ class WithDetectors(OnSite):
         if not part.open_at(standing):
             return replace(earlier, standing=None)
         question = f"does the fixture still stand at station {standing}?"
-        told = {"y": "yes, it was not touched", "n": "no or not sure: it is measured again, as a new station"}
-        if stands or self._person.choose(question, told, "n", "n") == "y":
+        choices = {"y": "yes, it was not touched", "n": "no or not sure: it is measured again, as a new station"}
+        if stands or self._person.choose(question, choices, "n", "n") == "y":
             return earlier
         place = same_place(part.rig, standing)
         self._reporter.report(

@@ -90,7 +90,7 @@ def taken_before(job: TrackedJob) -> TakenBefore:
         begun = {name: each[0].notes[name] for name in (SEED_NOTE, POSES_NOTE, PLAN_NOTE) if name in each[0].notes}
         if begun.get(PLAN_NOTE) != notes.get(PLAN_NOTE):
             other = "another --plan" if PLAN_NOTE in begun and job.plan is not None else "other poses"
-            raise AcquisitionError(f"{job.out}: the session was begun with {other}; go on with it as it was begun")
+            raise AcquisitionError(f"{job.out}: the session was begun with {other}; go on with it was begun")
         notes = begun
     plan = job.plan or drawn_plan(job.rig, int(notes.get(POSES_NOTE, job.poses)), int(notes.get(SEED_NOTE, job.seed)))
     done = frozenset(int(e.detail["pose"]) for one in each for e in one.events if e.kind == "sample")
@@ -183,7 +183,7 @@ def record_tracked(
             feed.progress(Progress("measure", done, total))
             reporter.report(f"{done} of {total} poses", on_screen=False)
 
-        def told(state: RunState) -> None:
+        def on_state(state: RunState) -> None:
             bar.update(task, description=state.value)
             if state in (RunState.PAUSED, RunState.RUNNING):
                 writer.event(Event(clock.now_s(), "run state", {"state": state.value}))
@@ -191,7 +191,7 @@ def record_tracked(
             if state is RunState.PAUSED:
                 reporter.report("r goes on, s ends here, a aborts")
 
-        control = control_of(bench, clock, reporter, told)
+        control = control_of(bench, clock, reporter, on_state)
         journal, home_rad = RecordingJournal(writer, clock), np.array(rig.motion.home_rad)
         session = TrackedSession(
             bench, journal, options or TrackedOptions(), home_rad, nominal_target(rig),

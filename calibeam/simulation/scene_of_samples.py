@@ -98,7 +98,7 @@ class Noise:
 
     def of(self, column: str, samples: Samples) -> Floats:
         """(row,) of a column; a sigma that stands beside a reading goes before all others."""
-        stated = _beside(column)
+        stated = _sigma_column(column)
         usual = np.full(len(samples), self.sigma.get(column, 0.0))
         if stated not in samples or column in self.found:
             return usual
@@ -145,9 +145,9 @@ def noise_of(rig: Rig, model: ModelFile, samples: Samples, *, as_found: bool = F
 
 def _typical(column: str, stated: float | None, samples: Samples) -> float | None:
     """As it stands beside the readings, in the middle; else as the rig states it."""
-    beside = _beside(column)
-    if beside in samples and np.isfinite(samples.column(beside)).any():
-        return float(np.nanmedian(samples.column(beside)))
+    sigma_column = _sigma_column(column)
+    if sigma_column in samples and np.isfinite(samples.column(sigma_column)).any():
+        return float(np.nanmedian(samples.column(sigma_column)))
     return stated
 
 
@@ -155,5 +155,5 @@ def _number(value: object) -> float | None:
     return float(value) if isinstance(value, float | int) and not isinstance(value, bool) else None
 
 
-def _beside(column: str) -> str:
+def _sigma_column(column: str) -> str:
     return column.removesuffix("_m") + "_sigma_m"

@@ -215,7 +215,7 @@ def _variance(
 ) -> dict[str, Floats]:
     """Column -> (row,) by the covariance of the model, and by conditions that are missing or beyond their range."""
     out = _of_values(model, predictor, applied.found, applied.by, at, columns)
-    for port, amount in applied.doubts:
+    for port, amount in applied.uncertain:
         for c, felt in _felt(at, predictor, applied.by, port, amount).items():
             out[c] = out[c] + felt**2
     return out
@@ -277,7 +277,7 @@ def flange_with_physics(model: ModelFile, samples: Samples) -> tuple[Floats, App
     of them. DataError as above.
     """
     predictor = Predictor.of(model)
-    applied = effects_at(model, predictor, samples, same_session=False, doubts_too=False)
+    applied = effects_at(model, predictor, samples, same_session=False, with_open=False)
     return _flange(predictor, applied, samples.joints())(predictor, applied.by), applied
 
 
@@ -328,7 +328,7 @@ def without_effects(weighting: Weighting, theta: Floats, samples: Samples, model
     if not model.effects:
         return weighting
     predictor = Predictor.of(model)
-    by, q = effects_at(model, predictor, samples, same_session=True, doubts_too=False).by, samples.joints()
+    by, q = effects_at(model, predictor, samples, same_session=True, with_open=False).by, samples.joints()
     unknowns, nothing = weighting.unweighted.unknowns, Perturbation.none(len(samples), samples.n_joints)
     chain = Chain(predictor.arm, predictor.at_shafts(q), weighting.measured, unknowns)
     plain, moved = (chain.under(theta, one).expected for one in (nothing, by))

@@ -31,7 +31,7 @@ from calibrate.compare.fit_to_simulation import (
 )
 from calibrate.compare.link_differs import (
     ROUNDING,
-    Parted,
+    JudgedLink,
     judged,
 )
 from calibrate.compare.matched import (
@@ -83,20 +83,20 @@ def compare(
     pair = _without_zeros(pair, zeros_rad), pair[1]
     asked, model, alike = explain(measured, simulated, pair, zeros_rad, made_of, diagnosed=diagnosed)
     links = differences(model, alike)
-    parted = judged(links, model, alike)
+    judged_links = judged(links, model, alike)
     rig = rig_differences(measured.rig, simulated.rig)
-    found = [*rig_mismatches(rig), *joint_mismatches(parted, links)]
-    if asked.beside is not None:
-        found += mismatches(asked.beside, zeros_rad)
+    found = [*rig_mismatches(rig), *joint_mismatches(judged_links, links)]
+    if asked.found is not None:
+        found += mismatches(asked.found, zeros_rad)
     else:
         found += zero_mismatches(zeros_rad)
     found += asked.left
     streams = stream_pairs(devices_of(measured), devices_of(simulated))
-    found += stream_mismatches(measured, simulated, asked.beside, streams)
+    found += stream_mismatches(measured, simulated, asked.found, streams)
     found.sort(key=lambda one: one.order)
     explained = any(one.decides and one.level not in (Level.RIG, Level.STREAMS) for one in found)
-    parted = tuple(_as_explained(one, asked, explained, pair[0]) for one in parted)
-    verdict = _verdict(found, parted, asked)
+    judged_links = tuple(_as_explained(one, asked, explained, pair[0]) for one in judged_links)
+    verdict = _verdict(found, judged_links, asked)
     return ComparisonFile(
         1,
         "calibeam-comparison",
@@ -109,10 +109,10 @@ def compare(
         _says(verdict, found, asked),
         rig,
         tuple(_record(one, structure) for one in found),
-        () if asked.beside is None else tuple(_dropped(one) for one in asked.beside.dropped),
+        () if asked.found is None else tuple(_dropped(one) for one in asked.found.dropped),
         asked.readings,
-        next((one.link for one in parted if one.parts), None),
-        parted,
+        next((one.link for one in judged_links if one.parts), None),
+        judged_links,
         _streams(streams),
         tuple(notes_of(asked)),
         asked.diagnosis,
@@ -126,7 +126,7 @@ def _refuse_wrong(recording: Recording) -> None:
     except (DataError, np.linalg.LinAlgError):
         return  # joints alone, or another arm: no reading shows which convention was meant
     if wrong:
-        raise DataError(f"{recording.path}: {'; besides, '.join(blunder.says for blunder in wrong)}")
+        raise DataError(f"{recording.path}: {'; besides, '.join(gross_error.says for gross_error in wrong)}")
 
 
 def _plans(measured: Recording, simulated: Recording) -> tuple[tuple[Key, ...], tuple[Key, ...]] | None:
@@ -151,9 +151,9 @@ def _without_zeros(pair: Pair, zeros_rad: Floats) -> Samples:
     return columns_of(pair[0], {n: pair[0].column(n) - zeros_rad[j] for j, n in enumerate(names)})
 
 
-def _as_explained(one: Parted, asked: Explanation, explained: bool, measured: Samples) -> Parted:
+def _as_explained(one: JudgedLink, asked: Explanation, explained: bool, measured: Samples) -> JudgedLink:
     """After a search a reading parts where it found something; noise is what it found, not what was assumed."""
-    if asked.beside is None or one.link not in EXPLAINED:
+    if asked.found is None or one.link not in EXPLAINED:
         return one
     if not explained:
         return replace(one, parts=False, first_t_s=None)
@@ -161,14 +161,14 @@ def _as_explained(one: Parted, asked: Explanation, explained: bool, measured: Sa
     return one if one.parts else replace(one, parts=one.largest_own > ROUNDING, first_t_s=first_t_s)
 
 
-def _verdict(found: list[Mismatch], parted: tuple[Parted, ...], asked: Explanation) -> Verdict:
+def _verdict(found: list[Mismatch], judged_links: tuple[JudgedLink, ...], asked: Explanation) -> Verdict:
     """No line above it may contradict it."""
     deciding = [one for one in found if one.decides]
     if any(one.level is not Level.UNEXPLAINED for one in deciding):
         return Verdict.MISMATCH
     if deciding:
         return Verdict.UNDECIDABLE
-    if asked.beside is None and any(one.parts for one in parted):
+    if asked.found is None and any(one.parts for one in judged_links):
         return Verdict.MISMATCH
     return Verdict.CONSISTENT if asked.why is None else Verdict.UNDECIDABLE
 

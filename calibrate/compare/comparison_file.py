@@ -7,7 +7,7 @@ from enum import Enum
 import msgspec
 
 from calibrate.compare.link_differs import (
-    Parted,
+    JudgedLink,
 )
 from calibrate.compare.rig_keys import RigKey
 from calibrate.diagnose.assess import Named
@@ -152,7 +152,7 @@ class ComparisonFile(msgspec.Struct, frozen=True):
     dropped: tuple[DroppedRecord, ...]
     readings: tuple[ReadingRecord, ...]
     first_link: str | None
-    links: tuple[Parted, ...]
+    links: tuple[JudgedLink, ...]
     streams: tuple[StreamRecord, ...]
     notes: tuple[str, ...]
     diagnosis: DiagnosisFile | None

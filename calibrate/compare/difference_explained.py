@@ -15,10 +15,10 @@ from calibrate.compare.chain import (
 from calibrate.compare.comparison_file import Level, Mismatch, ReadingRecord
 from calibrate.compare.corrected import compared_session, corrected_samples, simulated_of
 from calibrate.compare.fit_to_simulation import (
-    Beside,
+    SimulationFit,
     begin,
-    beside,
-    beside_structure,
+    fit_to_simulation,
+    fit_to_structure,
     set_alike,
 )
 from calibrate.compare.link_differs import (
@@ -43,7 +43,7 @@ FEWEST = 20  # samples of a search; fewer hold no more than the geometry
 class Explanation:
     """What a search gave; `beside` None: it was not made, and `why` has the reason."""
 
-    beside: Beside | None
+    found: SimulationFit | None
     readings: tuple[ReadingRecord, ...]
     diagnosis: DiagnosisFile | None
     left: tuple[Mismatch, ...]  # structure of the readings that remains and that no search has named
@@ -76,9 +76,9 @@ def explain(
     try:
         rng = np.random.default_rng(SEED)
         if made_of is None or made_of.covariance is None or differing:
-            found = beside(simulation, pair, rng, differing)
+            found = fit_to_simulation(simulation, pair, rng, differing)
         else:
-            found = beside_structure(simulation, pair, rng, made_of)
+            found = fit_to_structure(simulation, pair, rng, made_of)
         samples = corrected_samples(simulation, pair, found.T_simulated_measured)
         before = begin(simulation, compared_session(simulated.rig, samples))
     except (DataError, np.linalg.LinAlgError) as why:
@@ -110,10 +110,10 @@ def notes_of(asked: Explanation) -> Iterator[str]:
     """What was not compared, and why."""
     if asked.why is not None:
         yield asked.why
-    if asked.beside is not None:
-        for name in asked.beside.simulated.uncorrected:
+    if asked.found is not None:
+        for name in asked.found.simulated.uncorrected:
             yield f"{kind_of(name).noun}: what the simulation's own readings miss its geometry by is not taken out"
-        for part in asked.beside.blind:
+        for part in asked.found.blind:
             joint = part.where.removesuffix(".angle").removeprefix("joint")
             yield f"the target lies on the axis of joint {joint}: whether its zero differs cannot be determined"
 

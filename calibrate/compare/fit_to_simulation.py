@@ -77,7 +77,7 @@ class Constant:
 
 
 @dataclass(frozen=True, eq=False)
-class Beside:
+class SimulationFit:
     """What was found of the measured recording beside the simulation. `diagnosed.physics` None: the file is wrong."""
 
     simulated: Simulated
@@ -90,7 +90,7 @@ class Beside:
     wide: Fitted | None = None  # the model with those free, too: what every size and sigma is taken from
 
 
-def beside(simulated: Simulated, pair: Pair, rng: Generator, differing: Sequence[str] = ()) -> Beside:
+def fit_to_simulation(simulated: Simulated, pair: Pair, rng: Generator, differing: Sequence[str] = ()) -> SimulationFit:
     """DataError where there is too little to compare. `differing`: parameters that are known to differ.
 
     Constants first, all at once; then every effect of the catalogue beside those that are worth their numbers. What an
@@ -110,7 +110,7 @@ def beside(simulated: Simulated, pair: Pair, rng: Generator, differing: Sequence
     found = _asked(simulated, samples, rng, freed)
     for _ in range(ROUNDS):
         if found.physics is None:
-            return Beside(simulated, found, (), None, T, blind)
+            return SimulationFit(simulated, found, (), None, T, blind)
         kept = _still(simulated, found.physics.model, freed, sure)
         more = tuple(part for part in _named_constants(found, every) if part not in kept)
         if kept == freed and not more:
@@ -118,7 +118,7 @@ def beside(simulated: Simulated, pair: Pair, rng: Generator, differing: Sequence
         freed = (*kept, *more)
         found = _asked(simulated, samples, rng, freed)
     if found.physics is None:
-        return Beside(simulated, found, (), None, T, blind)
+        return SimulationFit(simulated, found, (), None, T, blind)
     others, back = alternatives(quadratic, freed), undetected(quadratic, freed)
     limits = {name: float(x) for part, off in back.items() for name, x in zip(part.names, off, strict=True)}
     model = _with_free(simulated, found.physics.model, limits)
@@ -127,12 +127,12 @@ def beside(simulated: Simulated, pair: Pair, rng: Generator, differing: Sequence
     dropped = tuple(_constant(simulated, model, covariance, part) for part in back)
     at, here = device_of(predictor_of(model.session, model.geometry)), device_of(simulated.model)
     if at is None or here is None:
-        return Beside(simulated, found, constants, None, T, blind, dropped, model)
+        return SimulationFit(simulated, found, constants, None, T, blind, dropped, model)
     device = _device(here, at, model, covariance)
-    return Beside(simulated, found, constants, device, inverse(here) @ at, blind, dropped, model)
+    return SimulationFit(simulated, found, constants, device, inverse(here) @ at, blind, dropped, model)
 
 
-def beside_structure(simulated: Simulated, pair: Pair, rng: Generator, structure: ModelFile) -> Beside:
+def fit_to_structure(simulated: Simulated, pair: Pair, rng: Generator, structure: ModelFile) -> SimulationFit:
     """The same where the simulation is made of a model: its geometry and effects enter with their covariance.
 
     What the model itself does not know is no difference; changes beyond it are findings of the search. DataError for a
@@ -151,9 +151,9 @@ def beside_structure(simulated: Simulated, pair: Pair, rng: Generator, structure
     if found.physics is not None:
         at = device_of(predictor_of(found.physics.model.session, found.physics.model.geometry))
     if found.physics is None or at is None or here is None:
-        return Beside(simulated, found, (), None, T)
+        return SimulationFit(simulated, found, (), None, T)
     model = found.physics.model
-    return Beside(simulated, found, (), _device(here, at, model, _covariance(model)), inverse(here) @ at)
+    return SimulationFit(simulated, found, (), _device(here, at, model, _covariance(model)), inverse(here) @ at)
 
 
 def _with_free(simulated: Simulated, model: Fitted, limits: Mapping[str, float]) -> Fitted:

@@ -69,7 +69,7 @@ NUDGE_RAD = 1e-6  # of a joint, for its lever on the readings
 
 
 @dataclass(frozen=True)
-class Parted:
+class JudgedLink:
     """One link over the matched samples, judged; `own`: without what the links in front explain. Times are those of
     the measured samples.
     """
@@ -91,19 +91,19 @@ class Parted:
     scatter: float  # from row to row: the noise that was found
 
 
-def judged(differences: tuple[Difference, ...], model: Predictor, pair: Pair) -> tuple[Parted, ...]:
+def judged(differences: tuple[Difference, ...], model: Predictor, pair: Pair) -> tuple[JudgedLink, ...]:
     """In the order of the chain."""
     sent = any(one.link == COMMAND for one in differences)
     each = (_judged(one, model, pair, len(differences)) for one in differences)
     return tuple(_as_input(one) if one.link == "joints" and not sent else one for one in each)
 
 
-def _as_input(one: Parted) -> Parted:
+def _as_input(one: JudgedLink) -> JudgedLink:
     """Without set-points the joints are where each arm stood, which the links behind them take into account."""
     return replace(one, parts=False, first_t_s=None)
 
 
-def _judged(one: Difference, model: Predictor, pair: Pair, links: int) -> Parted:
+def _judged(one: Difference, model: Predictor, pair: Pair, links: int) -> JudgedLink:
     own, good, t_s = one.own, np.isfinite(one.own), pair[0].column("t_s")
     sigma, where = _noise(one, model, pair)
     at_row, at_channel = np.unravel_index(int(np.nanargmax(np.abs(own))), own.shape)
@@ -125,7 +125,7 @@ def _judged(one: Difference, model: Predictor, pair: Pair, links: int) -> Parted
         first = float(t_s[rows[0] if len(rows) else np.flatnonzero(good.any(axis=1))[0]])
     scatter = scatter_of(own)
     scatter = scatter[np.isfinite(scatter)]
-    return Parted(
+    return JudgedLink(
         one.link,
         one.unit,
         int(good.any(axis=1).sum()),
@@ -164,16 +164,16 @@ def _noise(one: Difference, model: Predictor, pair: Pair) -> tuple[Floats | None
             return None, "a set-point has none"
         return np.broadcast_to(np.sqrt(2.0) * joint, one.own.shape), "assumed, and one count of the encoders"
     noise = model.rig.noise
-    told = {"spots": noise.psd_m, **{k.name: getattr(noise, k.noise[0].key, None) for k in SENSORS}}
+    stated_m = {"spots": noise.psd_m, **{k.name: getattr(noise, k.noise[0].key, None) for k in SENSORS}}
     ends_m = None if noise.seat_m is None else np.sqrt(2.0) * noise.seat_m
-    believed = ends_m if one.link == bar.KIND.name else told.get(one.link)
-    if believed is None and one.link == "spots":
+    assumed = ends_m if one.link == bar.KIND.name else stated_m.get(one.link)
+    if assumed is None and one.link == "spots":
         stated = _stated(pair)
         if stated is not None:
             return stated, "scatter within the samples"
-    if believed is None:
+    if assumed is None:
         return None, "unknown"
-    return np.sqrt(2.0) * np.hypot(believed, _through_joints(one, model, pair)), "assumed, of reading and joints"
+    return np.sqrt(2.0) * np.hypot(assumed, _through_joints(one, model, pair)), "assumed, of reading and joints"
 
 
 def _through_joints(one: Difference, model: Predictor, pair: Pair) -> Floats:

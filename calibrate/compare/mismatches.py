@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from calibrate.compare.comparison_file import TARGET, Level, Mismatch, Side, in_words
 from calibrate.compare.constants import LINK, ZERO
 from calibrate.compare.corrected import Simulated
-from calibrate.compare.fit_to_simulation import Beside, Constant
+from calibrate.compare.fit_to_simulation import Constant, SimulationFit
 from calibrate.diagnose.assess import Finding, named
 from calibrate.diagnose.search import Bench, sizes_of
 from calibrate.diagnose.state import Fitted
@@ -40,7 +40,7 @@ PARTS = {
 }
 
 
-def mismatches(found: Beside, zeros_rad: Floats) -> tuple[Mismatch, ...]:
+def mismatches(found: SimulationFit, zeros_rad: Floats) -> tuple[Mismatch, ...]:
     """`zeros_rad` (joint,): measured angles that are larger by a constant in all rows, taken out before."""
     out = [] if found.device is None else [_frame(found.device, decides=False)]
     out += [_of_constant(one, zeros_rad) for one in found.constants]
@@ -104,7 +104,7 @@ def _six(sizes: Mapping[str, Size]) -> str:
     return " and ".join(parts + ([f"turned by {', '.join(angles)}"] if angles else []))
 
 
-def _encoder_zeros(found: Beside) -> Mismatch | None:
+def _encoder_zeros(found: SimulationFit) -> Mismatch | None:
     """Of all second encoders; None without any, or where none differs."""
     if found.diagnosed.physics is None:
         return None
@@ -125,7 +125,7 @@ def _encoder_zeros(found: Beside) -> Mismatch | None:
     return Mismatch(Level.ENCODER_ZEROS, "encoders", "encoder-zero", sizes, says, decides=False)
 
 
-def _of_finding(finding: Finding, found: Beside, model: Fitted) -> Mismatch:
+def _of_finding(finding: Finding, found: SimulationFit, model: Fitted) -> Mismatch:
     """A constant that is no parameter of the model is a frame; what is left is physics. `model`: sizes are of this."""
     where, physics, rivals = finding.name.where, finding.name.physics, tuple(r.name for r in finding.rivals)
     sizes, says, accepted = finding.parameters, finding.says, None

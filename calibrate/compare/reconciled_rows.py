@@ -199,7 +199,7 @@ def on_unseen_rows(
 ) -> tuple[tuple[UnseenRowsRecord, ...], tuple[RowRecord, ...]]:
     """DataError where no instrument has a noise and unseen readings."""
     floors = {floor.instrument: floor for floor in diagnosis.floors}
-    told: list[UnseenRowsRecord] = []
+    records: list[UnseenRowsRecord] = []
     rows: list[RowRecord] = []
     for name, columns in QUANTITIES.items():
         floor = floors.get(name)
@@ -215,15 +215,15 @@ def on_unseen_rows(
         was, plain, now = (float(np.sqrt(np.mean(m[known] ** 2))) for m in misfits)
         noise_m = float(floor.rms_m)
         over = was / noise_m, plain / noise_m, now / noise_m
-        told.append(
+        records.append(
             UnseenRowsRecord(name, int(known.sum()), was, plain, now, noise_m, floor.source, *over, stated_m.get(name))
         )
         each = [np.sqrt(np.mean(m[known] ** 2, axis=1)).tolist() for m in misfits]
         t_s = measured.column("t_s")[unseen][known].tolist()
         rows += [RowRecord(name, *row) for row in zip(t_s, *each, strict=True)]
-    if not told:
+    if not records:
         raise DataError("no unseen reading with a known noise: how far the simulation is off cannot be determined")
-    return tuple(told), tuple(rows)
+    return tuple(records), tuple(rows)
 
 
 def _stacked(samples: Samples, names: tuple[str, ...]) -> Floats:
@@ -231,10 +231,10 @@ def _stacked(samples: Samples, names: tuple[str, ...]) -> Floats:
 
 
 def what_remains(
-    told: tuple[UnseenRowsRecord, ...], rows: tuple[RowRecord, ...], diagnosis: DiagnosisFile, after: ComparisonFile
+    records: tuple[UnseenRowsRecord, ...], rows: tuple[RowRecord, ...], diagnosis: DiagnosisFile, after: ComparisonFile
 ) -> Iterator[str]:
     """Why the two do not agree yet; nothing where they do."""
-    for one in told:
+    for one in records:
         if not one.after <= AGREES:
             where = _few_rows(one, [row for row in rows if row.instrument == one.instrument])
             yield f"{one.instrument}: {one.after:.2f} times the noise on unseen rows, more than {AGREES}{where}"
@@ -277,8 +277,8 @@ def what_was_left_out(before: ComparisonFile, diagnosis: DiagnosisFile, has_phys
             yield LackingRecord(one.where, one.physics, one.says, others)
 
 
-def verdict_text(told: tuple[UnseenRowsRecord, ...], before: ComparisonFile, remains: tuple[str, ...]) -> str:
-    worst = max(told, key=lambda one: one.after)
+def verdict_text(records: tuple[UnseenRowsRecord, ...], before: ComparisonFile, remains: tuple[str, ...]) -> str:
+    worst = max(records, key=lambda one: one.after)
     far = f"on unseen rows {significant(worst.before)} times the noise before, {significant(worst.after)} after"
     if remains:
         count = "one thing remains" if len(remains) == 1 else f"{len(remains)} things remain"

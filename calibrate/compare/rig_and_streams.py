@@ -16,10 +16,10 @@ from calibrate.compare.comparison_file import (
     Side,
 )
 from calibrate.compare.fit_to_simulation import (
-    Beside,
+    SimulationFit,
 )
 from calibrate.compare.link_differs import (
-    Parted,
+    JudgedLink,
 )
 from calibrate.compare.rig_keys import RigKey
 from calibrate.compare.streams import (
@@ -71,11 +71,11 @@ def _value(value: str | float | bool | None) -> str:
     return "nothing" if value is None else f"{value:.9g}" if isinstance(value, float) else str(value)
 
 
-def joint_mismatches(parted: tuple[Parted, ...], links: tuple[Difference, ...]) -> Iterator[Mismatch]:
+def joint_mismatches(judged_links: tuple[JudgedLink, ...], links: tuple[Difference, ...]) -> Iterator[Mismatch]:
     """Reported angles less the set-points: what a controller leaves over, where both recordings hold set-points."""
     if not any(one.link == "command" for one in links):
         return
-    for one in parted:
+    for one in judged_links:
         if one.link == "joints" and one.parts:
             j = int(np.argmax(np.abs(one.mean_own)))
             says = (
@@ -94,7 +94,7 @@ def zero_mismatches(zeros_rad: Floats) -> Iterator[Mismatch]:
 
 
 def stream_mismatches(
-    measured: Recording, simulated: Recording, found: Beside | None, pairs: tuple[StreamPair, ...]
+    measured: Recording, simulated: Recording, found: SimulationFit | None, pairs: tuple[StreamPair, ...]
 ) -> list[Mismatch]:
     """Of streams that both have: what each recording shows by itself, side by side, and what one motion shows.
 

@@ -238,9 +238,9 @@ def enough_of(poses: NDArray[np.intp], error_m: Floats) -> int | None:
     """The number behind the last one from which half as many more make it steeper than ENOUGH; a choice has steps."""
     more = np.interp(np.log(AHEAD * poses), np.log(poses), np.log(error_m))
     steep = (np.log(error_m) - more) / np.log(AHEAD) > ENOUGH
-    told = AHEAD * poses <= poses[-1]
-    last = int(np.flatnonzero(steep & told)[-1]) + 1 if np.any(steep & told) else 0
-    return int(poses[last]) if told[last] else None
+    ahead = AHEAD * poses <= poses[-1]
+    last = int(np.flatnonzero(steep & ahead)[-1]) + 1 if np.any(steep & ahead) else 0
+    return int(poses[last]) if ahead[last] else None
 
 
 def record_of(rig: Rig, made: Design, seen: Seen, places: Sequence[Places], software: str) -> dict[str, Any]:

@@ -55,7 +55,7 @@ def choose_places(
         rest = [k for k in own if k not in chosen]
         errors = [found.free_space_m(_information(found, own, [*chosen, k], poses)) for k in rest]
         chosen.append(rest[int(np.argmin(errors))])
-        out.append(_told(found, own, chosen, placements, poses, distance_sigma_m))
+        out.append(_found_places(found, own, chosen, placements, poses, distance_sigma_m))
     return tuple(out)
 
 
@@ -69,7 +69,7 @@ def _information(found: Information, own: dict[int, Floats], chosen: Sequence[in
     return np.eye(found.n) + poses / len(chosen) * np.sum([own[k] for k in chosen], axis=0)
 
 
-def _told(
+def _found_places(
     found: Information,
     own: dict[int, Floats],
     chosen: Sequence[int],

@@ -18,7 +18,7 @@ from calibrate.diagnose.assess import Isolability, Named, Smallest, isolability,
 from calibrate.diagnose.search import Bench
 from calibrate.diagnose.state import fit_geometry, session_of
 from calibrate.model.dual_psd_rig import assumed_noise
-from calibrate.model.sensors.position import POSITION_BELIEVED_M
+from calibrate.model.sensors.position import POSITION_ASSUMED_M
 
 Floats = NDArray[np.float64]
 
@@ -50,16 +50,16 @@ def seen_by(rig: Rig, candidates: Candidates, taken: Taken, rng: Generator) -> S
     q_rad = poses.q_rad + rng.normal(0.0, assumed_noise(rig).joint_rad, poses.q_rad.shape)
     samples = Candidates(q_rad, reading, poses.placement, poses.first_psd).samples(taken.approach, taken.repeat)
     bench = Bench(fit_geometry(session_of(_without_distances(rig), samples)))
-    told = isolability(bench.menu)
-    pairs = tuple((named(a), named(b), r2) for a, b, r2 in told.confusable())
+    isolable = isolability(bench.menu)
+    pairs = tuple((named(a), named(b), r2) for a, b, r2 in isolable.confusable())
     invisible = tuple(dict.fromkeys(named(term) for term in bench.menu.invisible))
-    return Seen(smallest_visible(bench), pairs, invisible, told)
+    return Seen(smallest_visible(bench), pairs, invisible, isolable)
 
 
 def _noise_m(rig: Rig, poses: Candidates) -> float:
     if poses.spots:
         return assumed_noise(rig).psd_m
-    return rig.noise.position_m or POSITION_BELIEVED_M
+    return rig.noise.position_m or POSITION_ASSUMED_M
 
 
 def _without_distances(rig: Rig) -> Rig:

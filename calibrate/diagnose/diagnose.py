@@ -131,7 +131,7 @@ def to_measure(findings: Sequence[Finding]) -> tuple[str, ...]:
         for remedy in (POSES, COOLED, WITNESS):
             mine = [r.name for r in finding.rivals if _remedy(finding.name, r) == remedy]
             if mine:
-                others = ", ".join(dict.fromkeys(name.beside(finding.name) for name in mine))
+                others = ", ".join(dict.fromkeys(name.compared_with(finding.name) for name in mine))
                 out.append(f"{finding.name.physics} at {finding.name.where} could also be {others}: {remedy}")
     return tuple(out)
 

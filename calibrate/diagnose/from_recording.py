@@ -17,7 +17,7 @@ from calibrate.diagnose import limits
 from calibrate.diagnose.assess.assessment import records
 from calibrate.diagnose.assess.diagnosis import Diagnosis, Unexplained, Verdict
 from calibrate.diagnose.assess.free_space_change import FreeSpaceChange, free_space_change
-from calibrate.diagnose.assess.missing_columns import TIME, doubtful
+from calibrate.diagnose.assess.missing_columns import TIME, not_final_drift
 from calibrate.diagnose.assess.stated_noise import (
     NoiseFound,
     Statement,
@@ -26,7 +26,7 @@ from calibrate.diagnose.assess.stated_noise import (
     noise_found,
 )
 from calibrate.diagnose.diagnose import diagnose
-from calibrate.diagnose.gross_errors import Cleared, blunders_first, unexplained_rows
+from calibrate.diagnose.gross_errors import Cleared, gross_errors_first, unexplained_rows
 from calibrate.diagnose.search import limits as search_limits
 from calibrate.diagnose.stages import (
     DECIDING,
@@ -90,7 +90,7 @@ def diagnose_samples(
     """
     stages = Stages(begun=begun)
     every = Cleared(samples, np.arange(len(samples)), ())
-    cleared = stages.attempt(Stage.FAULTS, lambda: blunders_first(rig, samples), every, refuses=True)
+    cleared = stages.attempt(Stage.FAULTS, lambda: gross_errors_first(rig, samples), every, refuses=True)
     if cleared.whole_file:
         return Diagnosed(cleared, cleared.blunders, None)
     if len(cleared.rows) < limits.FEWEST_SAMPLES:
@@ -110,7 +110,7 @@ def diagnose_samples(
         return Diagnosed(cleared, cleared.blunders, None, (*stages.failed, Incomplete(Stage.SEARCH, few)))
     diagnosis = diagnose(geometry, rng, missing_of(geometry.drivers), stages, causes)
     if geometry.samples < limits.FEWEST_FOR_NAMES:
-        diagnosis = replace(diagnosis, findings=tuple(map(doubtful, diagnosis.findings)))
+        diagnosis = replace(diagnosis, findings=tuple(map(not_final_drift, diagnosis.findings)))
     model = geometry if not diagnosis.findings else _fitted(diagnosis)
     attempt = stages.attempt
     diagnosis = attempt(Stage.BEYOND_NOISE, lambda: _with_noise(diagnosis, model, rng), diagnosis)
@@ -166,13 +166,13 @@ def _with_noise(diagnosis: Diagnosis, model: Fitted, rng: Generator) -> Diagnosi
     is more likely than not, and the columns that could explain it come first among what to do.
     """
     named = {finding.name.where for finding in diagnosis.findings}  # a drift without its thermometer leaves nothing
-    elsewhere = any(left.where not in named for left in diagnosis.unexplained)
-    noise = noise_found(model, rng, elsewhere=elsewhere)
+    unnamed = any(left.where not in named for left in diagnosis.unexplained)
+    noise = noise_found(model, rng, unnamed=unnamed)
     more = tuple(beyond_noise(n, diagnosis.missing) for n in noise if n.statement is Statement.EXCEEDED)
     if not more:
         return replace(diagnosis, noise=noise)
     first = () if diagnosis.unexplained else records(hidden_of(diagnosis.missing))
-    findings, then = tuple(map(doubtful, diagnosis.findings)), tuple(dict.fromkeys((*first, *diagnosis.next)))
+    findings, then = tuple(map(not_final_drift, diagnosis.findings)), tuple(dict.fromkeys((*first, *diagnosis.next)))
     return _with_unexplained(replace(diagnosis, noise=noise, findings=findings, next=then), more)
 
 

@@ -116,22 +116,22 @@ class Cleared:
     @property
     def whole_file(self) -> bool:
         """Whether there is nothing to diagnose before the file is put right."""
-        return any(blunder.whole_file for blunder in self.blunders)
+        return any(gross_error.whole_file for gross_error in self.blunders)
 
 
-def blunders_first(rig: Rig, samples: Samples) -> Cleared:
+def gross_errors_first(rig: Rig, samples: Samples) -> Cleared:
     """DataError where the samples hold no observation, or where so many rows are bad that none can be trusted."""
     if wrong := wrong_file(rig, samples):
         return Cleared(samples, np.zeros(0, dtype=np.intp), wrong)
-    blunders = [*impossible_rows(rig, samples), *_joined(rig, samples)]
-    kept = _kept(samples, blunders)
+    gross_errors = [*impossible_rows(rig, samples), *_joined(rig, samples)]
+    kept = _kept(samples, gross_errors)
     for _ in range(limits.OUTLYING_PASSES):
-        found = [_counted(blunder, kept) for blunder in _wild(session_of(rig, samples.take(kept)))]
+        found = [_counted(gross_error, kept) for gross_error in _outlying(session_of(rig, samples.take(kept)))]
         if not found:
             break
-        blunders += found
-        kept = _kept(samples, blunders)
-    return Cleared(samples.take(kept), kept, tuple(blunders))
+        gross_errors += found
+        kept = _kept(samples, gross_errors)
+    return Cleared(samples.take(kept), kept, tuple(gross_errors))
 
 
 def place_of(samples: Samples) -> Ints:
@@ -142,14 +142,14 @@ def place_of(samples: Samples) -> Ints:
     return np.full(len(samples), -1, dtype=np.intp)
 
 
-def _kept(samples: Samples, blunders: list[GrossError]) -> Ints:
-    refuse_most(tuple(blunders), len(samples)) if blunders else None
-    return np.setdiff1d(np.arange(len(samples)), rows_of(blunders))
+def _kept(samples: Samples, gross_errors: list[GrossError]) -> Ints:
+    refuse_most(tuple(gross_errors), len(samples)) if gross_errors else None
+    return np.setdiff1d(np.arange(len(samples)), rows_of(gross_errors))
 
 
-def _counted(blunder: GrossError, kept: Ints) -> GrossError:
+def _counted(gross_error: GrossError, kept: Ints) -> GrossError:
     """Rows of the file instead of rows of what was kept."""
-    return replace(blunder, rows=tuple(int(kept[row]) for row in blunder.rows))
+    return replace(gross_error, rows=tuple(int(kept[row]) for row in gross_error.rows))
 
 
 def _joined(rig: Rig, samples: Samples) -> list[GrossError]:
@@ -174,10 +174,10 @@ def _joined_among(flange: Floats, positions: Floats, point: Floats | None, rows:
     rough = rough_fit(flange, positions, np.zeros(3) if point is None else point)
     tips = flange[:, :3, :3] @ rough.point_m + flange[:, :3, 3]
     expected = tips @ rough.linear.T + rough.shift_m
-    return [b for b in found if _elsewhere(expected, positions, np.isin(rows, b.rows))]
+    return [b for b in found if _moved(expected, positions, np.isin(rows, b.rows))]
 
 
-def _elsewhere(expected: Floats, observed: Floats, block: NDArray[np.bool_]) -> bool:
+def _moved(expected: Floats, observed: Floats, block: NDArray[np.bool_]) -> bool:
     T_observed_expected = rigid_motion(observed[block], expected[block])
     linear, shift_m = T_observed_expected[:3, :3], T_observed_expected[:3, 3]
     middle = expected[block].mean(axis=0)
@@ -185,7 +185,7 @@ def _elsewhere(expected: Floats, observed: Floats, block: NDArray[np.bool_]) -> 
     return max(moved_m, float(Rotation.from_matrix(linear).magnitude())) > MOVED_LIMIT
 
 
-def _wild(session: Session) -> list[GrossError]:
+def _outlying(session: Session) -> list[GrossError]:
     """Single rows, and blocks farther off than a bump; rows count in the session's samples."""
     theta = wary_fit(session.weighting, session.start)
     problem = session.weighting.problem(theta)

@@ -227,7 +227,7 @@ def sources_of(
     DataError where a pattern matches nothing, where heat has no expansion, and where no source is left.
     """
     every = {p.name: p for p in possible(machine)}
-    laws = dict(_believed(rig, every.values(), identified=identified)) if plan.believed else {}
+    laws = dict(_assumed_laws(rig, every.values(), identified=identified)) if plan.believed else {}
     orders: dict[str, float | None] = {}
     for entry in plan.source:
         for one in _matching(entry, every):
@@ -253,14 +253,14 @@ def _source(machine: Machine, one: Possible, law: Law, order: float | None, plan
     return ErrorSource(one.name, one.kind.group, one.kind.unit, law, terms)
 
 
-def _believed(rig: Rig, every: Iterable[Possible], *, identified: bool) -> Iterator[tuple[str, Law]]:
+def _assumed_laws(rig: Rig, every: Iterable[Possible], *, identified: bool) -> Iterator[tuple[str, Law]]:
     for one in every:
-        law = _belief(rig, one, identified=identified)
+        law = _assumed_law(rig, one, identified=identified)
         if law is not None:
             yield one.name, law
 
 
-def _belief(rig: Rig, one: Possible, *, identified: bool) -> Law | None:
+def _assumed_law(rig: Rig, one: Possible, *, identified: bool) -> Law | None:
     tolerance, group, word = rig.tolerance, one.kind.group, one.kind.word
     if tolerance is not None and not identified and (group in (LENGTHS, ANGLES) or word == "zero"):
         return Law("normal", tolerance.length_m if group == LENGTHS else tolerance.angle_rad)

@@ -133,9 +133,9 @@ class Law:
             case "constant":
                 return 0.0
             case _:
-                return self._told_variance()
+                return self._stated_variance()
 
-    def _told_variance(self) -> float:
+    def _stated_variance(self) -> float:
         try:
             return float(self._standard.var())
         except TypeError as error:

@@ -56,7 +56,7 @@ class AnglesName(enum.Enum):
 Limit = Annotated[float, Meta(ge=0.0, le=1e12)]  # whitened and scaled, so that 1 is a noise or a plausible size
 
 
-class BesideName(enum.Enum):
+class MethodName(enum.Enum):
     """A method beside the fit, for comparison; the model stays that of the fit."""
 
     POINT_CONSTRAINT = "point-constraint"  # joint zeros from centred poses: calibrate/fit/identify/point_constraint.py
@@ -85,7 +85,7 @@ class FitPlan(Struct, frozen=True, forbid_unknown_fields=True):
     free: Few[Name] = ()  # without an opinion of the drawing
     priors: Mapping[Name, Positive] = {}  # pattern -> one sigma about the drawing, m or rad; a later one wins
     hold: Few[Name] = ()  # nominal; wins over `free` and `priors`
-    method: BesideName | None = None
+    method: MethodName | None = None
     loss: LossName = LossName.LEAST_SQUARES
     solver: SolverName = SolverName.LEVENBERG
     dog_leg: DogLeg | None = field(name="dog-leg", default=None)

@@ -69,13 +69,13 @@ class Weighting:
         return self.unweighted.parameters
 
     @property
-    def believed(self) -> VarianceFactors:
+    def assumed_factors(self) -> VarianceFactors:
         """Every source as large as assumed."""
         return as_assumed(len(self.sources))
 
     def problem(self, theta: Floats, factors: VarianceFactors | None = None) -> JointProblem:
         """The joint problem with weights from the noise at `theta` (param,), as assumed without `factors`."""
-        size = self.believed if factors is None else factors
+        size = self.assumed_factors if factors is None else factors
         blocks = [
             _weighted(instrument, self.unweighted.of_block(i, theta), self.joint_rad, self._sources_of(i), size)
             for i, instrument in enumerate(self.measured)
@@ -143,11 +143,11 @@ class Weighting:
         with self._naming(parameters):
             return variance.estimate(rows, len(self.sources), information, information * deviation, start)
 
-    def doubt(self, parameters: tuple[Parameter, ...], theta: Floats, factors: VarianceFactors) -> Floats:
+    def dof(self, parameters: tuple[Parameter, ...], theta: Floats, factors: VarianceFactors) -> Floats:
         """(free,) Satterthwaite degrees of freedom of the variances of the free parameters."""
         information, _, rows = self._linearised(parameters, theta)
         with self._naming(parameters):
-            return variance.doubt(rows, information, factors)
+            return variance.dof(rows, information, factors)
 
     def _naming(self, parameters: tuple[Parameter, ...]) -> AbstractContextManager[None]:
         return naming_undetermined([p.name for p in parameters if p.free], self.measured[0].problem.q_rad)

@@ -109,7 +109,7 @@ def evaluate(
         turn = _off_rad(aligned[:3, :3] @ turned, by_model.T_base_flange[:, :3, :3])
     better = AttainedPoses(sent.pose, side, t_s, wanted_m, wanted_m + off_m, turn)
     if chosen != "fit":
-        notes = (*notes, *_elsewhere(off_m, seen_m, by_model.tip_m))
+        notes = (*notes, *_at_other_places(off_m, seen_m, by_model.tip_m))
     return EvaluatedTest(
         len(part),
         chosen,
@@ -290,7 +290,7 @@ def _predicted(pose: Ints, wanted_m: Floats, by_model: Placed) -> dict[int, tupl
     return out
 
 
-def _elsewhere(off_m: Floats, seen_m: Floats, there_m: Floats) -> tuple[str, ...]:
+def _at_other_places(off_m: Floats, seen_m: Floats, there_m: Floats) -> tuple[str, ...]:
     """A sentence where the device has been moved since the model's session."""
     rms = float(np.sqrt(np.mean(np.sum(off_m**2, axis=1))))
     try:

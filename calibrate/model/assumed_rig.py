@@ -25,7 +25,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class AssumedArm(RigArm):
-    """Implements `acquisition.centring.aim.BelievedArm`."""
+    """Implements `acquisition.centring.aim.AssumedArm`."""
 
     laser_origin_m: Floats  # (3,) in the flange
     laser_direction: Floats  # (3,) unit

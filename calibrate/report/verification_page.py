@@ -136,7 +136,7 @@ def _measurements(found: Verification) -> Html:
             ("Measurement", "value", "permitted"),
             [(says, length(value), DASH if limit is None else length(limit)) for says, value, limit in one.each],
             numeric=(1, 2),
-            caption=f"{one.symbol}{_beside(one)}",
+            caption=f"{one.symbol}{_caption_end(one)}",
         )
         for one in found.figures
         if one.each
@@ -144,7 +144,7 @@ def _measurements(found: Verification) -> Html:
     return section("measurements", CONTENTS["measurements"], "What stands behind every figure.", *tables)
 
 
-def _beside(one: Figure) -> str:
+def _caption_end(one: Figure) -> str:
     return "".join(f"; {name} {length(value)}" for name, value in one.also)
 
 

@@ -100,8 +100,8 @@ def orientation_of(found: WristFit, targets: tuple[TargetRows, ...], points_m: F
 
 def spanned(points_m: Floats) -> Floats | None:
     """(3, 3) frame of three points (3, 3) with its axes as columns; None where they are on one line."""
-    along, beside = points_m[1] - points_m[0], points_m[2] - points_m[0]
-    normal = cross(along, beside)
+    along, across = points_m[1] - points_m[0], points_m[2] - points_m[0]
+    normal = cross(along, across)
     length, area = float(np.linalg.norm(along)), float(np.linalg.norm(normal))
     if area <= 1e-9 * max(length, 1e-9) ** 2:
         return None

@@ -100,10 +100,10 @@ def fitted_sphere(points_m: Floats) -> Sphere:
     found = np.linalg.lstsq(design, np.sum(p**2, axis=1), rcond=None)[0]
     start = np.append(found[:3], np.sqrt(max(found[3] + found[:3] @ found[:3], 0.0)))
 
-    def beside(x: Floats) -> Floats:
+    def residual_of(x: Floats) -> Floats:
         return np.linalg.norm(p - x[:3], axis=1) - x[3]
 
-    fit = least_squares(beside, start, method="lm", xtol=1e-15, ftol=1e-15, gtol=1e-15)
+    fit = least_squares(residual_of, start, method="lm", xtol=1e-15, ftol=1e-15, gtol=1e-15)
     centre = fit.x[:3]
     return Sphere(centre + middle, float(fit.x[3]), np.linalg.norm(p - centre, axis=1))
 

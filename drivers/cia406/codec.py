@@ -198,7 +198,7 @@ class ContinuousAngle:
         self._speed_limit_rad_s = speed_limit_rad_s
         self._acceleration_limit_rad_s2 = acceleration_limit_rad_s2
         self._last: _Reading | None = None
-        self._doubted: list[_Reading] = []
+        self._uncertain: list[_Reading] = []
 
     def follow(self, position: int, time_s: float) -> float:
         """Angle in rad for a position read at `time_s`, or NaN."""
@@ -206,24 +206,24 @@ class ContinuousAngle:
         if last is None:
             self._last = _Reading(self._step(position, 0), time_s, math.nan)
             return self._last.units * self._unit_rad
-        if self._doubted:
-            before = self._doubted[-1]
+        if self._uncertain:
+            before = self._uncertain[-1]
             reading = self._next(before, position, time_s)
             if self._is_motion(reading, before):
-                return self._doubt(reading, last)
-            self._doubted.clear()
+                return self._hold_back(reading, last)
+            self._uncertain.clear()
         reading = self._next(last, position, time_s)
         if self._is_motion(reading, last):
             return self._accept(reading)
-        return self._doubt(_Reading(reading.units, time_s, last.rate), last)
+        return self._hold_back(_Reading(reading.units, time_s, last.rate), last)
 
-    def _doubt(self, reading: "_Reading", last: "_Reading") -> float:
+    def _hold_back(self, reading: "_Reading", last: "_Reading") -> float:
         """NaN, or the angle after a slip when enough readings agree."""
         self.jumps += 1
-        self._doubted.append(reading)
-        if len(self._doubted) < READINGS_OF_A_SLIP:
+        self._uncertain.append(reading)
+        if len(self._uncertain) < READINGS_OF_A_SLIP:
             return math.nan
-        return self._slipped(last, self._doubted[0], reading)
+        return self._slipped(last, self._uncertain[0], reading)
 
     def _slipped(self, last: "_Reading", first: "_Reading", reading: "_Reading") -> float:
         rate = 0.0 if math.isnan(last.rate) else last.rate
@@ -238,7 +238,7 @@ class ContinuousAngle:
         if last is not None:
             self.wraps += abs(reading.units // self._range - last.units // self._range)
         self._last = reading
-        self._doubted.clear()
+        self._uncertain.clear()
         return reading.units * self._unit_rad
 
     def _next(self, before: "_Reading", position: int, time_s: float) -> "_Reading":

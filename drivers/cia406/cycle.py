@@ -56,7 +56,7 @@ class SyncCycle:
         self._under_way: deque[_Sync] = deque()  # not answered by all
         self._answered: list[_Sync] = []  # by all, but since the last moment at which nothing was under way
         self._busy_since_s = start_s
-        self._in_doubt: set[int] = set()  # an answer of theirs may be to an earlier SYNC
+        self._uncertain: set[int] = set()  # an answer of theirs may be to an earlier SYNC
         self.wakes_s = start_s  # when something is to be done without any frame coming: give up, or the next SYNC
 
     def sequence_at(self, now_s: float) -> int:
@@ -90,7 +90,7 @@ class SyncCycle:
                 break
         else:
             return ()
-        sync.answers[node] = math.nan if node in self._in_doubt else position_rad
+        sync.answers[node] = math.nan if node in self._uncertain else position_rad
         sync.arrived_s = now_s
         self._silent_since_s.pop(node, None)
         if len(self._under_way[0].answers) < self._nodes:
@@ -131,12 +131,12 @@ class SyncCycle:
     def _has_room(self) -> bool:
         """Whether the next SYNC may go out at its time while answers are on the way."""
         held_s = self._due_s - self._busy_since_s
-        return not self._in_doubt and held_s < HOLD_S and len(self._under_way) < MOST_UNDER_WAY
+        return not self._uncertain and held_s < HOLD_S and len(self._under_way) < MOST_UNDER_WAY
 
     def _close(self, short: set[int]) -> tuple[Row, ...]:
         """Nothing is under way any more; `short` are the nodes that answered too seldom, so that none of it counts."""
         syncs = [*self._answered, *self._under_way]
-        self._answered, self._in_doubt = [], short
+        self._answered, self._uncertain = [], short
         self._under_way.clear()
         rows: list[Row] = []
         for sync in syncs:

@@ -97,7 +97,7 @@ class ModbusLine:
 
     def read(self, table: str, address: int, count: int) -> list[int]:
         """Raw registers. DeviceLost, DeviceStale; DeviceRefused with the controller's exception code."""
-        with self._turn, self._told(f"reading {count} registers from {address}"):
+        with self._turn, self._with_reason(f"reading {count} registers from {address}"):
             client = self._opened()
             ask = client.read_input_registers if table == INPUT else client.read_holding_registers
             answer = self._checked(ask(address, count=count, device_id=self._unit), f"reading {address}")
@@ -108,7 +108,7 @@ class ModbusLine:
 
     def write(self, address: int, words: Sequence[int]) -> None:
         """Raw registers. Raises as `read`."""
-        with self._turn, self._told(f"writing {len(words)} registers from {address}"):
+        with self._turn, self._with_reason(f"writing {len(words)} registers from {address}"):
             answer = self._opened().write_registers(address, list(words), device_id=self._unit)
             self._checked(answer, f"writing {address}")
 
@@ -154,7 +154,7 @@ class ModbusLine:
         return answer
 
     @contextlib.contextmanager
-    def _told(self, what: str) -> Any:
+    def _with_reason(self, what: str) -> Any:
         """Whatever the libraries raise, as an error of this program; the connection is closed after one."""
         try:
             yield

@@ -45,7 +45,7 @@ class Kpa101Unit(StreamDevice[Transport]):
         self.last_junk: StrayBytes | None = None
         self._open_line = open_line
         self._codec = Kpa101Codec()
-        self._in_doubt = False
+        self._uncertain = False
         self._heard: list[Message] = []
 
     def identify(self) -> Info:
@@ -59,7 +59,7 @@ class Kpa101Unit(StreamDevice[Transport]):
 
     def _set_up(self, line: Transport) -> None:
         self._codec = Kpa101Codec()
-        self.junk_count, self.last_junk, self._in_doubt = 0, None, False
+        self.junk_count, self.last_junk, self._uncertain = 0, None, False
         self._write(StopUpdates())
         info = self.info = self.ask(RequestInfo(), Info)
         self._write(SetMode(Mode.MONITOR))
@@ -74,7 +74,7 @@ class Kpa101Unit(StreamDevice[Transport]):
         self._write(request)
         answer = self._await(kind, self._clock.now_s() + ANSWER_S)
         if answer is None:
-            self._in_doubt = True
+            self._uncertain = True
             raise DeviceStale(
                 f"{self.name}: no answer to {type(request).__name__} within {ANSWER_S:g} s at {self._opened().name}; "
                 f"check power and cable, and that the port is a KPA101{self._evidence()}"
@@ -84,18 +84,18 @@ class Kpa101Unit(StreamDevice[Transport]):
     def request(self, deadline_s: float) -> bool:
         """Ask for a reading, to be fetched by `fetch`. False when the line could not be cleared in time."""
         self._heard.clear()
-        if self._in_doubt:
+        if self._uncertain:
             self._write(RequestMode())
             if self._await(ModeIs, deadline_s) is None:
                 return False
-        self._in_doubt = True  # until it is fetched
+        self._uncertain = True  # until it is fetched
         self._write(RequestReadings())
         return True
 
     def fetch(self, deadline_s: float) -> Readings | None:
         """The reading asked for; None when it did not come by `deadline_s` of host time."""
         readings = self._await(Readings, deadline_s)
-        self._in_doubt = readings is None
+        self._uncertain = readings is None
         return readings
 
     def _release(self, line: Transport) -> None:

@@ -84,7 +84,7 @@ class ControlChild:
         self._silent, self._parent_stopped = silent, parent_stopped
         self._stopped_up_to = 0
         self._kick_every_s = 1.0 / (watchdog_hz * KICKS_PER_WATCHDOG)
-        self._kicked_s = self._told_s = now_s()
+        self._kicked_s = self._sent_s = now_s()
         self._beaten_s = self._turned_s = now_s()  # when the parent last beat, and when this process last looked
         self._asked_s = now_s()  # after the parent's state
         self._expired = False
@@ -149,8 +149,8 @@ class ControlChild:
             fault = self._fault()
             if fault is not None:
                 return fault
-            if self._now_s() - self._told_s > ALIVE_S:
-                self._told_s = self._now_s()
+            if self._now_s() - self._sent_s > ALIVE_S:
+                self._sent_s = self._now_s()
                 self._calls.send(Alive())
         return self._fault() or Ended(Outcome.DONE)
 

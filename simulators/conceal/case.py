@@ -26,7 +26,7 @@ from simulators.conceal.observe import (
 from simulators.conceal.plan import Timetable, draw_habits, draw_timetable
 from simulators.conceal.readings import flange_turn, stand
 from simulators.conceal.rig import ENCODER_RAD, Artefacts, Device, DualPsd, TrueRig
-from simulators.conceal.rig_file import Belief, believe
+from simulators.conceal.rig_file import StatedRig, state_rig
 from simulators.conceal.rigs import DrawnRig, draw_rig
 from simulators.conceal.wanted import INSTRUMENT, ConcealError, Wanted, draw_noise
 from simulators.defects import MECHANISMS, RAISED, Defect, Scene, Site, UnsuitedError
@@ -241,7 +241,7 @@ class Case:
 
     wanted: Wanted
     drawn: DrawnRig
-    belief: Belief
+    stated: StatedRig
     table: Timetable
     posture_rad: Floats  # (row, n) where the arm was sent or held
     hidden: Sequence[HiddenMechanism]
@@ -273,7 +273,7 @@ def _with_targets(wanted: Wanted, drawn: DrawnRig, table: Timetable) -> tuple[Dr
     true_m[1:] += drawn.spread.tool_m * rng.standard_normal((wanted.targets - 1, 3))
     number = table.pose % wanted.targets  # repeats are of one target
     true = replace(drawn.true, tool_point_m=true_m[number])
-    return replace(drawn, true=true), drawn.believed.tool_point_m + off_m, number + 1
+    return replace(drawn, true=true), drawn.nominal.tool_point_m + off_m, number + 1
 
 
 def _turns_rad(
@@ -334,7 +334,7 @@ def conceal(wanted: Wanted) -> Case:
         wanted,
         drawn,
         replace(
-            believe(wanted, drawn, distances, sigma_m, plan_rng), targets_m=targets_m, targets_sigma_m=wanted.placed_m
+            state_rig(wanted, drawn, distances, sigma_m, plan_rng), targets_m=targets_m, targets_sigma_m=wanted.placed_m
         ),
         table,
         posture_rad,

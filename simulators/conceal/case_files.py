@@ -125,7 +125,7 @@ def _rig(rig: TrueRig) -> dict[str, Any]:
 def _free_space(case: Case) -> dict[str, Any]:
     """Unseen poses at the start of the session: encoder readings, approach, and where the tool truly is."""
     rng = np.random.default_rng(SEED_OF_GRID)
-    reading_rad = free_poses(case.drawn.believed.arm, FREE_POSES, rng)
+    reading_rad = free_poses(case.drawn.nominal.arm, FREE_POSES, rng)
     scene = at_start(case.table.scene, reading_rad, rng)
     true = case.drawn.true
     defects = [one.defect for one in case.hidden]
@@ -250,7 +250,7 @@ def write_case(case: Case, folder: Path) -> None:
     recording, sealed = folder / "recording", folder / "sealed"
     recording.mkdir(parents=True, exist_ok=True)
     sealed.mkdir(parents=True, exist_ok=True)
-    (recording / "rig.toml").write_text(toml_text(rig_document(case.belief)), encoding="utf-8")
+    (recording / "rig.toml").write_text(toml_text(rig_document(case.stated)), encoding="utf-8")
     (recording / "samples.csv").write_text(csv_text(columns(case)), encoding="utf-8", newline="")
     truth: dict[str, Any] = truth_document(case)
     (sealed / "truth.json").write_text(json.dumps(truth, indent=1) + "\n", encoding="utf-8")
@@ -330,7 +330,7 @@ def _constants(case: Case) -> list[str]:
 
 def _arm_off(case: Case, off: Mapping[str, float]) -> TrueRig:
     """The assumed rig with these constants changed."""
-    drawing, believed = case.drawn.drawing, case.drawn.believed
+    drawing, nominal = case.drawn.drawing, case.drawn.nominal
     rows, zero_rad = list(drawing.rows), np.zeros(drawing.n_joints)
     for name, by in off.items():
         owner, _, what = name.partition(".")
@@ -340,8 +340,8 @@ def _arm_off(case: Case, off: Mapping[str, float]) -> TrueRig:
         else:
             row += drawing.model == "mdh" and what != "offset"  # Craig's a and alpha come first
             rows[row] = replace(rows[row], **{FIELDS[what]: getattr(rows[row], FIELDS[what]) + by})
-    fixed = fixed_parts(replace(drawing, rows=tuple(rows))) if off else believed.arm.fixed
-    return replace(believed, arm=replace(believed.arm, fixed=fixed, zero_rad=zero_rad))
+    fixed = fixed_parts(replace(drawing, rows=tuple(rows))) if off else nominal.arm.fixed
+    return replace(nominal, arm=replace(nominal.arm, fixed=fixed, zero_rad=zero_rad))
 
 
 def over_noise_of(case: Case) -> dict[str, float]:
@@ -350,17 +350,17 @@ def over_noise_of(case: Case) -> dict[str, float]:
     """
     if not case.off:
         return {}
-    names, believed = _constants(case), case.drawn.believed
+    names, nominal = _constants(case), case.drawn.nominal
 
     def slope(ahead: TrueRig, behind: TrueRig) -> Floats:
         one, two = (observe(rig, case.table.scene, (), case.posture_rad).values_m for rig in (ahead, behind))
         return np.asarray((one - two).ravel() / (2.0 * STEP))
 
     columns = [slope(_arm_off(case, {name: STEP}), _arm_off(case, {name: -STEP})) for name in names]
-    tilts = np.abs(believed.arm.fixed[:, 2, 2]) > 1.0 - PARALLEL
+    tilts = np.abs(nominal.arm.fixed[:, 2, 2]) > 1.0 - PARALLEL
     left_out = {f"link{k}.{axis}" for k, tilt in enumerate(tilts) for axis in range(6) if axis != 4 or not tilt}
-    others = [one for one in list_deviations(believed, case.drawn.spread) if one.name not in left_out]
-    columns += [slope(one.apply(believed, STEP), one.apply(believed, -STEP)) for one in others]
+    others = [one for one in list_deviations(nominal, case.drawn.spread) if one.name not in left_out]
+    columns += [slope(one.apply(nominal, STEP), one.apply(nominal, -STEP)) for one in others]
     matrix = np.stack(columns, axis=1)
     unit = matrix / (np.linalg.norm(matrix, axis=0) + np.finfo(float).tiny)
 

@@ -184,7 +184,7 @@ def machine_like(wanted_kinds: Sequence[str], site: Site, rng: np.random.Generat
             )
         kind = kinds[int(rng.integers(len(kinds)))]
         try:
-            drawn = _elsewhere(kind, {one.port for one in out}, site, rng)
+            drawn = _at_another_place(kind, {one.port for one in out}, site, rng)
         except UnsuitedError as reason:
             raise ConcealError(f"{kind.KIND}: {reason}; take another arm, family or seed") from reason
         low, high = SIZES[kind]
@@ -193,7 +193,7 @@ def machine_like(wanted_kinds: Sequence[str], site: Site, rng: np.random.Generat
     return out
 
 
-def _elsewhere(kind: type[Any], taken: set[str], site: Site, rng: np.random.Generator) -> Any:
+def _at_another_place(kind: type[Any], taken: set[str], site: Site, rng: np.random.Generator) -> Any:
     """One whose place is not taken. UnsuitedError where there is none."""
     for _ in range(DRAW_ROUNDS):
         if (drawn := kind.draw(rng, site)).port not in taken:

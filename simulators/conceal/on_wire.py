@@ -20,7 +20,7 @@ from simulators.conceal.effect_over_noise import INVISIBLE, measure_distances, s
 from simulators.conceal.observe import Observed, observe
 from simulators.conceal.plan import Habits, Timetable, draw_timetable
 from simulators.conceal.rig import DualPsd, Spread, TrueRig
-from simulators.conceal.rig_file import Belief, believe, rig_document
+from simulators.conceal.rig_file import StatedRig, rig_document, state_rig
 from simulators.conceal.rigs import DrawnRig
 from simulators.conceal.wanted import ConcealError, Wanted
 from simulators.defects import MECHANISMS, Defect, Scene, Site
@@ -115,7 +115,7 @@ class Wired:
     emulated: Mapping[str, Any]  # rig file of the world
     site_rig: Mapping[str, Any]  # rig file of the session
     drawn: DrawnRig
-    belief: Belief
+    stated: StatedRig
     sigma_m: float
     hidden: Sequence[HiddenMechanism]
 
@@ -143,8 +143,8 @@ def draw_wired(wanted: Wanted, plain: Mapping[str, Any]) -> Wired:
     rig_rng, plan_rng, hide_rng = (np.random.default_rng([wanted.seed, stream]) for stream in (11, 12, 13))
     rig = read_rig(plain)
     true = rig_of_world(rig, draw_truth(rig, wanted.seed), plain)
-    believed = rig_of_world(rig, nominal_truth(rig), plain)
-    drawn = DrawnRig(drawing_of(plain, rig_rng), believed, true, spread_of(rig))
+    nominal = rig_of_world(rig, nominal_truth(rig), plain)
+    drawn = DrawnRig(drawing_of(plain, rig_rng), nominal, true, spread_of(rig))
     table = draw_timetable(wanted, true, Habits(change_s=0.0), plan_rng)
     sigma_m = _sigma_m(rig, true, table, plan_rng)
     distances = measure_distances(true, plan_rng)
@@ -153,9 +153,9 @@ def draw_wired(wanted: Wanted, plain: Mapping[str, Any]) -> Wired:
         scale = scale_of(drawn, table, _watch(true, table), sigma_m, distances)
         site = _on_site(site_of(wanted, drawn, table), wanted)
         hidden = [_one(wanted, site, lambda kind, rng: hide(wanted, [kind], (), site, scale, rng), hide_rng)]
-    belief = believe(wanted, drawn, distances, sigma_m, plan_rng)
-    site_rig = {**rig_document(belief), **{section: plain[section] for section in ("devices", "motion")}}
-    return Wired(wanted, plain, site_rig, drawn, belief, sigma_m, hidden)
+    stated = state_rig(wanted, drawn, distances, sigma_m, plan_rng)
+    site_rig = {**rig_document(stated), **{section: plain[section] for section in ("devices", "motion")}}
+    return Wired(wanted, plain, site_rig, drawn, stated, sigma_m, hidden)
 
 
 def taken_case(wired: Wired, taken: Taken) -> Case:
@@ -166,12 +166,12 @@ def taken_case(wired: Wired, taken: Taken) -> Case:
     defects = [one.defect for one in wired.hidden]
     hidden = list(wired.hidden)
     if defects:
-        scale = scale_of(drawn, world, watch, wired.sigma_m, wired.belief.distances)
+        scale = scale_of(drawn, world, watch, wired.sigma_m, wired.stated.distances)
         hidden = [HiddenMechanism(_in_session(d, taken.power_on_s), scale.enr([d]), scale.raw([d])) for d in defects]
     return Case(
         wired.wanted,
         drawn,
-        wired.belief,
+        wired.stated,
         table,
         taken.reading_rad,
         hidden,

@@ -78,7 +78,7 @@ class KnownDistance:
 
 
 @dataclass(frozen=True, eq=False)
-class Belief:
+class StatedRig:
     """All that goes into rig.toml."""
 
     drawing: Drawing
@@ -95,19 +95,19 @@ class Belief:
     targets_sigma_m: float | None = None  # as stated of each
 
 
-def rig_document(belief: Belief) -> dict[str, Any]:
+def rig_document(stated: StatedRig) -> dict[str, Any]:
     """The rig file as nested values, in the order of the interchange format."""
-    document: dict[str, Any] = {"schema": 1, "name": belief.drawing.name}
-    document["arm"] = _arm(belief)
-    if belief.encoder_side:
+    document: dict[str, Any] = {"schema": 1, "name": stated.drawing.name}
+    document["arm"] = _arm(stated)
+    if stated.encoder_side:
         for joint in document["arm"]["joint"]:
-            joint["encoder_side"] = belief.encoder_side
-    document["tool"] = _tool(belief)
-    if belief.targets_m is not None:
-        known = {} if belief.targets_sigma_m is None else {"point_sigma_m": belief.targets_sigma_m}
-        points = enumerate(belief.targets_m.tolist(), start=1)
+            joint["encoder_side"] = stated.encoder_side
+    document["tool"] = _tool(stated)
+    if stated.targets_m is not None:
+        known = {} if stated.targets_sigma_m is None else {"point_sigma_m": stated.targets_sigma_m}
+        points = enumerate(stated.targets_m.tolist(), start=1)
         document["target"] = [{"id": k, "point_m": point} | known for k, point in points]
-    instrument = belief.rig.instrument
+    instrument = stated.rig.instrument
     if isinstance(instrument, DualPsd):
         document["fixture"] = {
             "half_size_m": instrument.half_size_m,
@@ -117,27 +117,27 @@ def rig_document(belief: Belief) -> dict[str, Any]:
             {"id": number, "psd1_in_base": Inline(pose_record(place))}
             for number, place in enumerate(instrument.places, start=1)
         ]
-    if isinstance(instrument, Device) and belief.device_known:
+    if isinstance(instrument, Device) and stated.device_known:
         document["device"] = pose_record(instrument.pose)
-    if belief.distances:
+    if stated.distances:
         document["known_distance"] = [
             {"from": one.first, "to": one.second, "length_m": one.length_m, "sigma_m": one.sigma_m}
-            for one in belief.distances
+            for one in stated.distances
         ]
-    if belief.bars_m:
-        document["bar"] = [{"id": number, "length_m": length} for number, length in enumerate(belief.bars_m, start=1)]
-    document["noise"] = dict(belief.noise)
-    if belief.tolerance:
-        document["tolerance"] = dict(belief.tolerance)
+    if stated.bars_m:
+        document["bar"] = [{"id": number, "length_m": length} for number, length in enumerate(stated.bars_m, start=1)]
+    document["noise"] = dict(stated.noise)
+    if stated.tolerance:
+        document["tolerance"] = dict(stated.tolerance)
     return document
 
 
-def _arm(belief: Belief) -> dict[str, Any]:
-    drawing = belief.drawing
+def _arm(stated: StatedRig) -> dict[str, Any]:
+    drawing = stated.drawing
     flange = dict(zip(("origin_m", "rotation_rad"), map(list, drawing.flange), strict=True))
     return {
         "model": drawing.model,
-        "gravity_m_s2": belief.rig.arm.gravity_m_s2.tolist(),
+        "gravity_m_s2": stated.rig.arm.gravity_m_s2.tolist(),
         "joint": [_joint(drawing, index) for index in range(drawing.n_joints)],
         "flange": flange,
     }
@@ -163,17 +163,17 @@ def _joint(drawing: Drawing, index: int) -> dict[str, Any]:
     return joint
 
 
-def _tool(belief: Belief) -> dict[str, Any]:
+def _tool(stated: StatedRig) -> dict[str, Any]:
     tool: dict[str, Any] = {}
-    if belief.tool_kg is not None:
-        tool |= {"mass_kg": belief.tool_kg, "com_m": belief.tool_com_m.tolist()}
-    instrument = belief.rig.instrument
+    if stated.tool_kg is not None:
+        tool |= {"mass_kg": stated.tool_kg, "com_m": stated.tool_com_m.tolist()}
+    instrument = stated.rig.instrument
     if isinstance(instrument, DualPsd):
         return tool | {
             "laser_origin_m": instrument.laser_origin_m.tolist(),
             "laser_direction": instrument.laser_direction.tolist(),
         }
-    return tool if belief.targets_m is not None else tool | {"point_m": belief.rig.tool_point_m.tolist()}
+    return tool if stated.targets_m is not None else tool | {"point_m": stated.rig.tool_point_m.tolist()}
 
 
 def pose_record(pose: Floats) -> dict[str, Any]:
@@ -185,9 +185,9 @@ NOISE_KEY = {"dual-psd": "psd_m", "tracker": "position_m", "wire": "wire_m", "co
 WRONG_BY = (1.5, 8.0)  # the noise of a rig file against the true one, up or down
 
 
-def believe(
+def state_rig(
     wanted: Wanted, drawn: DrawnRig, distances: Sequence[KnownDistance], sigma_m: float, rng: np.random.Generator
-) -> Belief:
+) -> StatedRig:
     """The rig file of a session whose true noise is `sigma_m`."""
     wrong = float(np.exp(rng.choice([-1.0, 1.0]) * rng.uniform(*np.log(WRONG_BY))))
     spread = drawn.spread
@@ -198,12 +198,12 @@ def believe(
     if wanted.family == "cones":
         noise["joint_rad"] = ENCODER_RAD * wrong
     bars_m = drawn.true.instrument.bar_m if isinstance(drawn.true.instrument, Artefacts) else np.empty(0)
-    weighed = drawn.believed.arm.tool_kg > 0.0 and bool(drawn.drawing.mass_kg)
-    return Belief(
+    weighed = drawn.nominal.arm.tool_kg > 0.0 and bool(drawn.drawing.mass_kg)
+    return StatedRig(
         drawing=drawn.drawing,
-        rig=drawn.believed,
-        tool_kg=drawn.believed.arm.tool_kg if weighed else None,
-        tool_com_m=drawn.believed.arm.tool_com_m,
+        rig=drawn.nominal,
+        tool_kg=drawn.nominal.arm.tool_kg if weighed else None,
+        tool_com_m=drawn.nominal.arm.tool_com_m,
         device_known=bool(rng.random() < 0.5),
         distances=distances,
         bars_m=tuple(bars_m.tolist()),

@@ -79,7 +79,7 @@ class DrawnRig:
     """Nominal, assumed and true."""
 
     drawing: Drawing  # as the rig file shows it: perhaps in another notation, perhaps without masses
-    believed: TrueRig
+    nominal: TrueRig
     true: TrueRig
     spread: Spread
 
@@ -92,14 +92,14 @@ def draw_rig(wanted: Wanted, rng: np.random.Generator) -> DrawnRig:
         shown = replace(shown, mass_kg=(), com_m=())
     spread = _spread(full, rng)
     spread = spread if wanted.placed_m is None else replace(spread, tool_m=wanted.placed_m)
-    arm = _believed_arm(full, rng)
+    arm = _nominal_arm(full, rng)
     if wanted.family == "dual-psd":
-        believed, true = _with_fixture(arm, full, wanted.places, spread, rng)
+        nominal, true = _with_fixture(arm, full, wanted.places, spread, rng)
     else:
         point_m = np.array([0.0, 0.0, 0.05]) + rng.uniform(-0.06, 0.06, 3) if full.gear_ratio else np.zeros(3)
-        believed = TrueRig(arm, point_m, _others(wanted, full, rng))
-        true = perturbed(believed, spread, rng)
-    return DrawnRig(_confused(shown) if wanted.confused else shown, believed, true, spread)
+        nominal = TrueRig(arm, point_m, _others(wanted, full, rng))
+        true = perturbed(nominal, spread, rng)
+    return DrawnRig(_confused(shown) if wanted.confused else shown, nominal, true, spread)
 
 
 def _confused(drawing: Drawing) -> Drawing:
@@ -139,7 +139,7 @@ def _spread(drawing: Drawing, rng: np.random.Generator) -> Spread:
     )
 
 
-def _believed_arm(drawing: Drawing, rng: np.random.Generator) -> Arm:
+def _nominal_arm(drawing: Drawing, rng: np.random.Generator) -> Arm:
     n = drawing.n_joints
     weighed = bool(drawing.mass_kg)
     return Arm(
@@ -182,9 +182,9 @@ def _with_fixture(
         places=NO_LASER_PLACE,
     )
     true = perturbed(TrueRig(arm, np.zeros(3), bare), spread, rng)
-    believed_places = [_place(true, drawing, rng) for _ in range(places)]
+    nominal_places = [_place(true, drawing, rng) for _ in range(places)]
     off = moved(spread.place_m * rng.standard_normal((places, 3)), spread.place_rad * rng.standard_normal((places, 3)))
-    nominal = np.stack(believed_places)
+    nominal = np.stack(nominal_places)
     fixture = true.instrument
     assert isinstance(fixture, DualPsd)  # noqa: S101 - narrows the type
     return (

@@ -25,9 +25,9 @@ def draw_noise(kind: Kind, rows: int, channels: int, rng: np.random.Generator) -
         return rng.standard_normal((rows, channels))
     if kind == "heavy":
         noise = rng.standard_t(FREEDOM, (rows, channels)) / np.sqrt(FREEDOM / (FREEDOM - 2.0))
-        wild = np.flatnonzero(rng.random(rows) < OUTLIER_SHARE)
-        far = rng.uniform(*OUTLIER_SIGMAS, wild.size)
-        noise[wild] += far[:, np.newaxis] * _directions(wild.size, channels, rng)
+        outlying = np.flatnonzero(rng.random(rows) < OUTLIER_SHARE)
+        far = rng.uniform(*OUTLIER_SIGMAS, outlying.size)
+        noise[outlying] += far[:, np.newaxis] * _directions(outlying.size, channels, rng)
         return noise
     shocks = rng.standard_normal((rows, channels))
     wander = np.empty_like(shocks)
@@ -46,7 +46,7 @@ Family = Literal["dual-psd", "tracker", "cones", "wire"]
 FAMILIES: tuple[Family, ...] = get_args(Family)
 Side = Literal["link", "motor", "beside"]  # of second encoders: simulators/conceal/observe.py
 SIDES: tuple[Side, ...] = get_args(Side)
-Beside = Literal["too-much", "constants"]  # a simulation of the session: what it differs by
+SimulationKind = Literal["too-much", "constants"]  # a simulation of the session: what it differs by
 INSTRUMENT = {"dual-psd": "dual-psd", "tracker": "position", "cones": "seat", "wire": "wire"}
 
 
@@ -75,4 +75,4 @@ class Wanted:
     targets: int = 1  # of a tracker, on the flange, read in turn
     placed_m: float | None = None  # one sigma of where they sit about their drawing; None: as brackets by hand do
     six_d: bool = False  # a tracker reads the orientation of its target, too
-    beside: Beside | None = None  # a simulation of the same plan is recorded, too; tracker, rig file in rows
+    beside: SimulationKind | None = None  # a simulation of the same plan is recorded, too; tracker, rig file in rows

@@ -273,8 +273,8 @@ def _runout(sigma: HandEmulation, rng: np.random.Generator) -> TrueRunout:
     )
 
 
-def _off(believed_m: Vector, sigma: HandEmulation, rng: np.random.Generator) -> Vector:
-    return vector(np.array(believed_m) + sigma.artefact_sigma_m * rng.standard_normal(3))
+def _off(nominal_m: Vector, sigma: HandEmulation, rng: np.random.Generator) -> Vector:
+    return vector(np.array(nominal_m) + sigma.artefact_sigma_m * rng.standard_normal(3))
 
 
 def _bars(rig: HandRig, rng: np.random.Generator) -> tuple[TrueBar, ...]:

@@ -29,14 +29,14 @@ class Report:
 
     def __init__(self, log: Log) -> None:
         self._log = log
-        self._told: set[tuple[str, str]] = set()
+        self._reported: set[tuple[str, str]] = set()
         self.count = 0
 
     def fault(self, place: str, fault: Exception) -> None:
         self.count += 1
         kind = (place, type(fault).__name__)
-        if kind not in self._told:
-            self._told.add(kind)
+        if kind not in self._reported:
+            self._reported.add(kind)
             self._log(f"{place}: {type(fault).__name__}: {fault} (further ones of this kind are not logged)")
 
 

@@ -171,7 +171,7 @@ def test_no_controller_at_the_address_is_named(rig_with, session_of) -> None:
     assert "127.255.0.9" in said
 
 
-def test_the_wrong_device_on_the_port_is_told_apart(rig_with, session_of) -> None:
+def test_the_wrong_device_on_the_port_is_distinguished(rig_with, session_of) -> None:
     with Emulation(RIG, seed=1) as emulation:
         code, said = session_of(rig_with(("out/emulated/psd", emulation.address["can"]["channel"])))
     assert code == 1

@@ -68,12 +68,12 @@ def test_what_the_simulation_lacks_is_named(sessions, tmp_path):
 
 
 @pytest.mark.endure  # daily: test_what_the_simulation_lacks_is_named
-def test_a_detector_that_sits_elsewhere_beside_the_other_is_named(sessions, tmp_path):
-    def elsewhere(columns):
+def test_a_detector_that_sits_at_another_place_next_to_the_other_is_named(sessions, tmp_path):
+    def shifted(columns):
         columns["psd2_x_m"] -= SHIFT_M  # in its own plane: the beam meets it where it did
         return noisy(columns)
 
-    said = compared(rewritten(sessions[1], tmp_path / "shifted", elsewhere), sessions[1], tmp_path)
+    said = compared(rewritten(sessions[1], tmp_path / "shifted", shifted), sessions[1], tmp_path)
     (one,) = (d for d in said["differences"] if d["decides"])
     assert (one["where"], one["physics"]) == ("psd2.reading", "psd-moved")
     shift = one["sizes"]["x_m"]
@@ -101,7 +101,7 @@ def test_joints_that_read_otherwise_where_the_spots_are_the_same_part_at_the_spo
     assert said["diagnosis"] is None
 
 
-def test_rows_without_a_partner_are_told(sessions, tmp_path):
+def test_rows_without_a_partner_are_reported(sessions, tmp_path):
     fewer = rewritten(sessions[1], tmp_path / "fewer", lambda columns: {n: v[5:] for n, v in columns.items()})
     said = compared(sessions[1], fewer, tmp_path, "--no-diagnose")
     assert len(said["only_measured_t_s"]) == 5

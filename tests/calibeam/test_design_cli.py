@@ -19,11 +19,11 @@ def test_a_design_leaves_a_plan_a_page_and_figures(tmp_path, capsys):
     plan, page = tmp_path / "plan.toml", tmp_path / "design.html"
     options = ["--poses", "24", "--repeats", "3", "--candidates", "8", "--out", str(plan), "--report", str(page)]
     assert run(["design", str(ROBOT), *options, "--json"]) == 0
-    told = json.loads(capsys.readouterr().out)
+    lines = json.loads(capsys.readouterr().out)
     assert read_pose_plan(plan, load_rig(ROBOT)).poses == 24
-    assert told["free_space_m"] < told["random_free_space_m"]
-    assert told["smallest"][0]["value"] > 0.0
-    assert len(told["isolability"]["r2"]) == len(told["isolability"]["terms"])
+    assert lines["free_space_m"] < lines["random_free_space_m"]
+    assert lines["smallest"][0]["value"] > 0.0
+    assert len(lines["isolability"]["r2"]) == len(lines["isolability"]["terms"])
     assert "Design of a session" in page.read_text(encoding="utf-8")
 
 
@@ -42,21 +42,21 @@ def test_errors_of_the_reference_arm_leave_a_folder(tmp_path, capsys):
     assert run(["simulate-errors", str(ARM), *errors, "--out", str(tmp_path)]) == 0
     said = " ".join(capsys.readouterr().out.split())
     assert "worst posture" in said
-    told = json.loads((tmp_path / "errors.json").read_text())
-    for pose in told["poses"]:
+    lines = json.loads((tmp_path / "errors.json").read_text())
+    for pose in lines["poses"]:
         assert pose["drawn_rms_m"] == pytest.approx(pose["linear_rms_m"], rel=0.02)
-    assert sum(line["share"] for line in told["budget"]) == pytest.approx(1.0)
+    assert sum(line["share"] for line in lines["budget"]) == pytest.approx(1.0)
     assert {path.suffix for path in tmp_path.iterdir()} == {".json", ".html", ".svg"}
 
 
 def test_a_robot_is_simulated_the_same_with_any_number_of_workers(capsys):
-    told = []
+    lines = []
     for workers in ("1", "2"):
         options = ["--only", "link2.*", "joint*.zero", "--arms", "10000", "--poses", "2", "--workers", workers]
         assert run(["simulate-errors", str(ROBOT), *options, "--json"]) == 0
-        told.append(json.loads(capsys.readouterr().out))
-    assert told[0] == told[1]
-    assert len(told[0]["sources"]) == 12
+        lines.append(json.loads(capsys.readouterr().out))
+    assert lines[0] == lines[1]
+    assert len(lines[0]["sources"]) == 12
 
 
 def test_an_error_that_moves_nothing_has_no_worst_posture_and_no_share(tmp_path, capsys):
@@ -66,9 +66,9 @@ def test_an_error_that_moves_nothing_has_no_worst_posture_and_no_share(tmp_path,
     said = " ".join(capsys.readouterr().out.split())
     assert "no worst posture: none of these errors moves the probe" in said
     assert "Sobol indices over 6 of them" in said
-    told = json.loads((tmp_path / "errors.json").read_text())
-    assert (told["worst"], told["sobol_poses"]) == ([], 6)
-    assert (told["sources"][0]["share_first"], told["sources"][0]["share_total"]) == (0.0, 0.0)
+    lines = json.loads((tmp_path / "errors.json").read_text())
+    assert (lines["worst"], lines["sobol_poses"]) == ([], 6)
+    assert (lines["sources"][0]["share_first"], lines["sources"][0]["share_total"]) == (0.0, 0.0)
 
 
 def test_errors_without_a_size_are_refused(capsys):

@@ -44,7 +44,7 @@ def test_a_dark_face_is_not_asked() -> None:
 def test_encoders_and_bus_in_trouble() -> None:
     calm = {"emergency_code": np.zeros((1, 2), dtype=np.uint16), "bus_errors": np.zeros(1, dtype=np.uint32)}
     assert bus_trouble(Block(*np.zeros((3, 1)), calm), {1: 0, 2: 0}) == ""
-    told = Block(*np.zeros((3, 1)), calm | {"emergency_code": np.array([[0, 0x7320]])})
-    assert "joint 2 reports emergency 7320h, position error" in bus_trouble(told, {})
+    faulty = Block(*np.zeros((3, 1)), calm | {"emergency_code": np.array([[0, 0x7320]])})
+    assert "joint 2 reports emergency 7320h, position error" in bus_trouble(faulty, {})
     assert "node 2 is at fault, error register 81h" in bus_trouble(Block(*np.zeros((3, 1)), calm), {1: 0, 2: 0x81})
     assert "3 error frames" in bus_trouble(Block(*np.zeros((3, 1)), calm | {"bus_errors": np.array([3])}), {})

@@ -44,7 +44,7 @@ def test_the_report_of_the_session_takes_the_pages_up(folder, out, tmp_path):
     assert text.index('id="errors"') < text.index('id="finding-1"') < text.index('id="provenance"')
 
 
-def test_a_file_in_degrees_is_told_written_and_ends_with_1(folder, tmp_path, capsys):
+def test_a_file_in_degrees_is_reported_written_and_ends_with_1(folder, tmp_path, capsys):
     wrong = tmp_path / "degrees"
     wrong.mkdir()
     (wrong / "rig.toml").write_text((folder / "rig.toml").read_text())

@@ -68,9 +68,9 @@ def refused(path, data, read):
     path.write_bytes(data)
     with pytest.raises(DataError) as caught:
         read(path)
-    told = str(caught.value).replace(str(path.parent), ".")
-    assert len(told) <= 300
-    return told
+    lines = str(caught.value).replace(str(path.parent), ".")
+    assert len(lines) <= 300
+    return lines
 
 
 MODELS = {

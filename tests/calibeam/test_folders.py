@@ -8,7 +8,7 @@ import pytest
 import calibeam
 
 
-def test_our_own_folders_are_found_beside_the_program():
+def test_our_own_folders_are_found_next_to_the_program():
     calibeam.check_folders()
 
 

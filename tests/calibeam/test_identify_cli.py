@@ -128,18 +128,18 @@ def test_samples_without_observations_are_predicted_too(folder, tmp_path, capsys
     assert [list(row) for row in rows(out)] == [["t_s", *POSITION, *(f"s_{c}" for c in POSITION), "outside"]] * 4
 
 
-def test_the_arm_is_exported_beside_the_model_of_a_session(identified):
+def test_the_arm_is_exported_next_to_the_model_of_a_session(identified):
     assert "rad" in (identified[0] / "model.urdf").read_text()
 
 
 @pytest.mark.endure  # daily: as URDF, above; the other forms are those of `export-model`
 @pytest.mark.parametrize(("form", "suffix"), [("dh-csv", ".dh.csv"), ("matlab", ".m")])
-def test_the_arm_is_exported_beside_the_model(folder, tmp_path, form, suffix):
+def test_the_arm_is_exported_next_to_the_model(folder, tmp_path, form, suffix):
     assert run(["identify", str(folder), "--out", str(tmp_path / "model.json"), "--export", form]) == 0
     assert "rad" in (tmp_path / f"model{suffix}").read_text()
 
 
-def test_a_bad_row_is_told_and_stands_in_the_model(folder, tmp_path, capsys):
+def test_a_bad_row_is_reported_and_stands_in_the_model(folder, tmp_path, capsys):
     table = (folder / "samples.csv").read_text().splitlines()
     cells = table[8].split(",")
     cells[7] = str(float(cells[7]) + 0.1)
@@ -147,8 +147,8 @@ def test_a_bad_row_is_told_and_stands_in_the_model(folder, tmp_path, capsys):
     (folder / "samples.csv").write_text("\n".join(table) + "\n")
     assert run(["identify", str(folder), "--out", str(tmp_path / "model.json")]) == 0
     assert "left out: row 8, y_m: reads" in capsys.readouterr().out.replace("\n", " ")
-    (blunder,) = json.loads((tmp_path / "model.json").read_text())["blunders"]
-    assert (blunder["kind"], blunder["rows"], blunder["column"]) == ("WRONG_VALUE", [8], "y_m")
+    (gross_error,) = json.loads((tmp_path / "model.json").read_text())["blunders"]
+    assert (gross_error["kind"], gross_error["rows"], gross_error["column"]) == ("WRONG_VALUE", [8], "y_m")
 
 
 def test_a_file_in_degrees_fails_with_one_sentence(folder, tmp_path, capsys):
@@ -175,8 +175,8 @@ def test_a_plan_in_another_arm_model_predicts_by_its_model_file_alone(folder, tm
     assert content["bootstrap"] == {"rounds": 8, "failed": 0}
     assert {p["split"] for p in content["proofs"]} == {"last 20% of the session"}
     assert content["free_space"]["rms_m"] < content["free_space"]["pose_rms_m"]
-    told = [p for p in content["parameters"] if p["value"] is not None]
-    assert all(p["low"] < p["value"] < p["high"] and p["bootstrap_sigma"] > 0.0 for p in told)
+    lines = [p for p in content["parameters"] if p["value"] is not None]
+    assert all(p["low"] < p["value"] < p["high"] and p["bootstrap_sigma"] > 0.0 for p in lines)
     q = np.random.default_rng(9).uniform(-2.0, 2.0, (30, 5))
     seen = observed(q, np.random.default_rng(8))
     write_samples(tmp_path / "new.csv", q, seen)
@@ -228,9 +228,9 @@ def test_what_the_format_promises_to_refuse_names_file_row_and_column(folder, tm
     table[line] = table[line].replace(old, new, 1)
     (folder / "samples.csv").write_text("\n".join(table) + "\n")
     assert run(["identify", str(folder), "--out", str(tmp_path / "model.json")]) == 1
-    told = capsys.readouterr().err
-    assert f"{folder / 'samples.csv'}" in told
-    assert says in told
+    lines = capsys.readouterr().err
+    assert f"{folder / 'samples.csv'}" in lines
+    assert says in lines
 
 
 def test_where_nothing_is_determined_the_command_fails_and_writes_no_model(folder, tmp_path, capsys):
@@ -242,10 +242,10 @@ def test_where_nothing_is_determined_the_command_fails_and_writes_no_model(folde
 
 
 def test_the_first_word_is_the_report_s_verdict_and_no_alarming_status(identified):
-    at, told = identified
+    at, lines = identified
     judged = session_verdict(session_evidence(read(at / "session"), read_model(at / "model.json")))
-    assert told.startswith(" ".join(" ".join([judged.sentence, *judged.reasons]).split()))
-    assert "RANK_DEFICIENT" not in told
+    assert lines.startswith(" ".join(" ".join([judged.sentence, *judged.reasons]).split()))
+    assert "RANK_DEFICIENT" not in lines
 
 
 @pytest.mark.parametrize("instrument", ["position", "distance"])
@@ -260,9 +260,9 @@ def test_a_fit_that_came_to_no_end_is_partial_and_its_model_is_kept(folder, tmp_
     model = tmp_path / "model.json"
     monkeypatch.setattr(import_module("calibrate.fit.solvers.solve"), "solve", partial(solve, max_steps=0))
     assert run(["identify", str(folder), "--out", str(model)]) == 3
-    told = capsys.readouterr()
-    assert "No usable model: step limit reached" in " ".join(told.out.split())
-    assert f"what was found so far is in {model}" in " ".join(told.err.split())
+    lines = capsys.readouterr()
+    assert "No usable model: step limit reached" in " ".join(lines.out.split())
+    assert f"what was found so far is in {model}" in " ".join(lines.err.split())
     assert read_model(model).status == "OUT_OF_STEPS"
 
 
@@ -285,10 +285,10 @@ def test_the_rule_that_ended_a_fit_and_its_iterations_are_on_the_screen_and_in_t
     plan, model, page = tmp_path / "fit.toml", tmp_path / "model.json", tmp_path / "report.html"
     plan.write_text('schema = 1\nshare = 0\nsolver = "dog-leg"\n[dog-leg]\nkmax = 2\ne1 = 0\ne2 = 0\ne3 = 0\n')
     run(["identify", str(folder), "--plan", str(plan), "--out", str(model), "--verbose"])
-    told = " ".join(capsys.readouterr().out.split())
+    lines = " ".join(capsys.readouterr().out.split())
     iterations = read_model(model).fit.iterations
-    assert f"fit by dog-leg, least-squares: {iterations} iterations in all rounds, ended by STEPS" in told
-    assert "kmax" in told
+    assert f"fit by dog-leg, least-squares: {iterations} iterations in all rounds, ended by STEPS" in lines
+    assert "kmax" in lines
     run(["report", str(folder), "--model", str(model), "--out", str(page)])
     assert "Fit by dog-leg, least-squares" in page.read_text()
     assert "ended by STEPS" in page.read_text()

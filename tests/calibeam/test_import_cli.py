@@ -48,9 +48,9 @@ def test_yes_writes_what_is_stated(lab, capsys):
 
 def test_an_open_unit_is_refused_where_nobody_is_asked(lab, capsys):
     assert command("--yes") == 1
-    told = capsys.readouterr().err
-    assert "columns 'A1' …: no unit stands there" in told
-    assert '--columns "A1 A2 A3 A4 A5 A6 [deg] = q"' in told
+    lines = capsys.readouterr().err
+    assert "columns 'A1' …: no unit stands there" in lines
+    assert '--columns "A1 A2 A3 A4 A5 A6 [deg] = q"' in lines
     assert not Path("session").exists()
 
 
@@ -88,9 +88,9 @@ def test_a_person_who_does_not_agree_gets_nothing(lab, person, capsys):
 @pytest.mark.parametrize("name", ["identify", "export"])
 def test_who_reads_a_table_is_led_here(lab, name, capsys):
     assert run([name, "lab.xlsx", "--out", "out"]) == 1
-    told = capsys.readouterr().err
-    assert "calibeam import lab.xlsx --rig RIG.toml --out lab" in told
-    assert "MCAP" not in told
+    lines = capsys.readouterr().err
+    assert "calibeam import lab.xlsx --rig RIG.toml --out lab" in lines
+    assert "MCAP" not in lines
 
 
 def test_the_table_of_a_session_folder_means_the_folder(lab, capsys):
@@ -118,7 +118,7 @@ def test_the_table_of_a_session_folder_means_the_folder(lab, capsys):
         (["lab.xlsx", "--rig", str(RIG), "--out", "s", "--sheet", "Two"], "no sheet 'Two'; there are Sheet"),
     ],
 )
-def test_what_cannot_be_imported_is_told_in_one_sentence(lab, arguments, says, capsys):
+def test_what_cannot_be_imported_is_reported_in_one_sentence(lab, arguments, says, capsys):
     assert run(["import", *arguments]) == 1
     assert says in capsys.readouterr().err
 
@@ -145,6 +145,6 @@ def test_a_column_of_reflectors_is_the_target_of_each_row(tmp_path, cells):
 
 def test_a_reflector_without_a_number_is_refused_with_what_to_do(tmp_path, capsys):
     assert tracked(tmp_path, ("R1", "left", "R3")) == 1
-    told = capsys.readouterr().err
-    assert "row 3, column 'Reflector': 'left'" in told
-    assert "'Reflector' = unused" in told
+    lines = capsys.readouterr().err
+    assert "row 3, column 'Reflector': 'left'" in lines
+    assert "'Reflector' = unused" in lines

@@ -259,7 +259,7 @@ def test_encoders_are_read_from_a_can_log_by_their_dbc_file(tmp_path, way, dbc_r
     assert len(frames.host_s) == 6 * 150 + 30
 
 
-def test_a_can_log_beside_a_robots_log_shows_the_delay_between_them(tmp_path, way, dbc_rig):
+def test_a_can_log_next_to_a_robots_log_shows_the_delay_between_them(tmp_path, way, dbc_rig):
     stamp_s, q_rad = joints(way)
     table = {"time [s]": EPOCH_S + stamp_s} | {f"q{i} [rad]": q_rad[:, i - 1] for i in range(1, 7)}
     pq.write_table(pa.table(table), tmp_path / "robot.parquet")

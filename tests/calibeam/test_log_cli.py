@@ -125,11 +125,11 @@ def test_positions_and_every_frame_are_kept(new_log, tmp_path: Path) -> None:
     logged = np.rint(logged_rad[np.isfinite(logged_rad)] / math.tau * COUNTS).astype(int) % COUNTS
     assert len(set(logged.tolist())) > 1
     assert set(logged.tolist()) <= raw  # an answer that came too late is in the raw frames only
-    (told,) = [event for event in recording.events if event.kind == "encoders"]
-    assert [identity["node"] for identity in told.detail["identities"]] == [1, 2, 3, 4, 5, 6]
+    (lines,) = [event for event in recording.events if event.kind == "encoders"]
+    assert [identity["node"] for identity in lines.detail["identities"]] == [1, 2, 3, 4, 5, 6]
 
 
-def test_ctrl_c_ends_a_log_and_the_next_one_goes_on_beside_it(new_log, tmp_path: Path) -> None:
+def test_ctrl_c_ends_a_log_and_the_next_one_goes_on_next_to_it(new_log, tmp_path: Path) -> None:
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
 
     def press(state: LogState) -> None:
@@ -219,7 +219,7 @@ def test_a_driver_that_cannot_be_made_leaves_nothing_behind(tmp_path: Path) -> N
     assert list(tmp_path.iterdir()) == []
 
 
-def test_encoders_are_told_apart_by_their_serial_numbers() -> None:
+def test_encoders_are_distinguished_by_their_serial_numbers() -> None:
     driver = Cia406Encoders(bus_opener("virtual", "none", 1_000_000), [1])
     one = EncoderIdentity(1, 0x20196, 5, 6, 1, 17, Scale(4096, 4096, True), 0x281, (), 0)
     driver.identities = (one,)
@@ -302,7 +302,7 @@ def test_the_command_logs_exports_imports_recovers(
         (["log", "encoders", str(RIG), "--rotate-mb", "0"], "above 0"),
     ],
 )
-def test_what_cannot_be_done_is_told_in_one_sentence(
+def test_what_cannot_be_done_is_reported_in_one_sentence(
     arguments: list[str], says: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)

@@ -121,7 +121,7 @@ def test_a_move_whose_program_was_frozen_is_given_up(rig: Path, tmp_path: Path) 
         (["jog", "--joint", "9", "--by-deg", "1"], "joints 1 to 6"),
     ],
 )
-def test_what_makes_no_sense_is_told_before_any_line_is_opened(arguments: list[str], why: str, capsys) -> None:
+def test_what_makes_no_sense_is_reported_before_any_line_is_opened(arguments: list[str], why: str, capsys) -> None:
     command, *options = arguments
     assert run([command, str(RIG), *options]) == 1
     assert why in capsys.readouterr().err
@@ -129,8 +129,8 @@ def test_what_makes_no_sense_is_told_before_any_line_is_opened(arguments: list[s
 
 def test_the_examples_leave_plots_and_figures(tmp_path: Path) -> None:
     assert run(["motion", "--only", "joint", "--out", str(tmp_path)]) == 0
-    told = json.loads((tmp_path / "motion.json").read_text())["examples"]
-    assert told["joint"]["hand off its planned track at most, m"] < 3e-3  # the controller smooths over 30 ms
+    lines = json.loads((tmp_path / "motion.json").read_text())["examples"]
+    assert lines["joint"]["hand off its planned track at most, m"] < 3e-3  # the controller smooths over 30 ms
     assert (tmp_path / "joint.svg").stat().st_size > 10_000
     drawn_s, said_s = ((tmp_path / name).stat().st_mtime for name in ("plan-joint.svg", "joint.svg"))
     assert drawn_s < said_s  # the plan is drawn before the arm moves

@@ -31,9 +31,9 @@ def test_such_a_folder_is_identified_predicted_and_reported(folder, tmp_path, ca
     assert "no [tolerance]: links assumed to ± 5 mm, 10 mrad, PSD 2 in PSD 1 to ± 1 mm, 5 mrad" in said
     found = read_model(model)
     assert found.rms_distance_after_m < 5e-6
-    told = {p.name: p.undetermined for p in found.parameters}
-    assert told["link6.twist"].startswith("known from its assumed tolerance only")
-    assert [name for name, why in told.items() if name.endswith(".zero") and why is None] == [
+    lines = {p.name: p.undetermined for p in found.parameters}
+    assert lines["link6.twist"].startswith("known from its assumed tolerance only")
+    assert [name for name, why in lines.items() if name.endswith(".zero") and why is None] == [
         f"joint{k}.zero" for k in (2, 3, 4, 5)
     ]
     assert run(["predict", str(model), str(folder / "samples.csv"), "--out", str(tmp_path / "p.csv")]) == 0

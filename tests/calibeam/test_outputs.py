@@ -131,7 +131,7 @@ def test_every_kind_of_result_takes_the_place_of_its_older_self(made, tmp_path, 
 TEXT = text_output("ours", "text")
 
 
-def test_a_full_disk_leaves_the_older_file_and_nothing_beside_it(tmp_path, monkeypatch):
+def test_a_full_disk_leaves_the_older_file_and_nothing_next_to_it(tmp_path, monkeypatch):
     path = write_output(tmp_path / "a.txt", "ours 1", TEXT)
 
     def full(descriptor):

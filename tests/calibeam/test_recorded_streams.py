@@ -18,8 +18,8 @@ def diagnosed(folder, trouble, clocks):
     recorded(RIG, path, trouble, clocks)
     assert run(["diagnose", str(path), "--out", str(out)]) == 0
     file = json.loads(out.read_bytes())
-    told = {(f["physics"], f["where"], f["stream"]): f for f in file["findings"] if f["stream"] is not None}
-    return told, file
+    by_name = {(f["physics"], f["where"], f["stream"]): f for f in file["findings"] if f["stream"] is not None}
+    return by_name, file
 
 
 def size(finding, name):
@@ -28,8 +28,8 @@ def size(finding, name):
 
 @pytest.mark.endure  # daily: streams/test_examine.py, and tests/calibeam/test_diagnose_streams.py
 def test_healthy_devices_are_left_in_peace_and_their_clocks_known_to_a_tenth_of_a_millisecond(tmp_path):
-    told, file = diagnosed(tmp_path, Trouble(), Clocks())
-    assert told == {}
+    by_name, file = diagnosed(tmp_path, Trouble(), Clocks())
+    assert by_name == {}
     clocks = {one["stream"]: one for one in file["streams"]["clocks"]}
     assert clocks["spots"]["offset_s"] == pytest.approx(20.0 - PSD_S, abs=1e-4)
     assert clocks["encoders"]["offset_s"] == pytest.approx(20.0 - 1000.0, abs=1e-4)
@@ -38,17 +38,17 @@ def test_healthy_devices_are_left_in_peace_and_their_clocks_known_to_a_tenth_of_
 @pytest.mark.endure  # daily: streams/test_examine.py, and tests/calibeam/test_diagnose_streams.py
 def test_a_late_encoder_a_slip_a_drifting_clock_and_lost_frames_in_one_session(tmp_path):
     trouble = Trouble(slip_joint=5, slip_rad=4e-4, slip_s=18.0, lag_joint=3, lag_s=8e-3)
-    told, file = diagnosed(tmp_path, trouble, Clocks(drift=4e-4, lost_at_s=9.0, lost_samples=30, doubled_at_s=11.0))
-    assert set(told) == {
+    by_name, file = diagnosed(tmp_path, trouble, Clocks(drift=4e-4, lost_at_s=9.0, lost_samples=30, doubled_at_s=11.0))
+    assert set(by_name) == {
         ("reading-lag", "joint3.angle", "encoders"),
         ("encoder-slip", "joint5.angle", "encoders"),
         ("latency", "time", "spots"),
     }
-    assert size(told["reading-lag", "joint3.angle", "encoders"], "behind_s") == pytest.approx(8e-3, abs=1e-4)
-    slip = told["encoder-slip", "joint5.angle", "encoders"]
+    assert size(by_name["reading-lag", "joint3.angle", "encoders"], "behind_s") == pytest.approx(8e-3, abs=1e-4)
+    slip = by_name["encoder-slip", "joint5.angle", "encoders"]
     assert size(slip, "slip_rad") == pytest.approx(4e-4, abs=1e-5)
     assert slip["from_s"] < 20.0 + 18.0 < slip["to_s"]  # on the clock of the joints
-    assert size(told["latency", "time", "spots"], "drift_s_per_s") == pytest.approx(-4e-4, abs=1e-5)
+    assert size(by_name["latency", "time", "spots"], "drift_s_per_s") == pytest.approx(-4e-4, abs=1e-5)
     clocks = {one["stream"]: one for one in file["streams"]["clocks"]}
     assert clocks["encoders"]["offset_s"] == pytest.approx(20.0 - 1000.0, abs=1e-4)
     usual = {one["physics"]: one for one in file["streams"]["usual"] if one["stream"] == "spots"}
@@ -59,15 +59,15 @@ def test_a_late_encoder_a_slip_a_drifting_clock_and_lost_frames_in_one_session(t
 @pytest.mark.endure  # the longest of three
 def test_a_swinging_column_and_a_clock_that_was_set(tmp_path):
     trouble = Trouble(swing_hz=7.0, swing_damping=0.03, swing_rad=6e-5)
-    told, file = diagnosed(tmp_path, trouble, Clocks(step_s=0.25, step_at_s=15.0))
+    by_name, file = diagnosed(tmp_path, trouble, Clocks(step_s=0.25, step_at_s=15.0))
     for stream in ("encoders", "spots"):
-        ringing = told["ringing", "joint1.angle", stream]
+        ringing = by_name["ringing", "joint1.angle", stream]
         assert size(ringing, "frequency_hz") == pytest.approx(7.0, rel=0.02)
         assert size(ringing, "damping_share") == pytest.approx(0.03, rel=0.2)
-    step = told["clock-step", "time", "spots"]
+    step = by_name["clock-step", "time", "spots"]
     assert size(step, "jump_s") == pytest.approx(0.25, abs=1e-3)
     assert step["from_s"] == pytest.approx(PSD_S + 15.0, abs=2e-3)
-    assert set(told) - {("not-settled", "time", "spots")} == {
+    assert set(by_name) - {("not-settled", "time", "spots")} == {
         ("ringing", "joint1.angle", "encoders"),
         ("ringing", "joint1.angle", "spots"),
         ("clock-step", "time", "spots"),

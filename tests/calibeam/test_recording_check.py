@@ -40,7 +40,7 @@ def log_of(tmp_path: Path) -> Callable[..., Path]:
     return made
 
 
-def test_a_good_recording_is_told_with_its_rate_and_clock(log_of, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_good_recording_is_reported_with_its_rate_and_clock(log_of, capsys: pytest.CaptureFixture[str]) -> None:
     assert run(["check", str(log_of("segment-0001.mcap"))]) == 0
     said = capsys.readouterr().out
     assert "psd: samples: 2000, 999.8 a second over 2.0 s; clock +40.0 µs/s against the host" in said

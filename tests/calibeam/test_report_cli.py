@@ -96,7 +96,7 @@ def test_a_model_by_a_plan_is_read_by_its_plan(folder, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("arguments", "code", "told"),
+    ("arguments", "code", "lines"),
     [
         (["missing.mcap"], 1, "missing.mcap"),
         (["text.mcap"], 1, "text.mcap"),
@@ -107,13 +107,13 @@ def test_a_model_by_a_plan_is_read_by_its_plan(folder, tmp_path):
     ],
 )
 def test_what_cannot_be_reported_is_said_with_its_exit_code(
-    folder, tmp_path, capsys, monkeypatch, arguments, code, told
+    folder, tmp_path, capsys, monkeypatch, arguments, code, lines
 ):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "text.mcap").write_text("nothing of the kind")
     assert run(["report", *arguments]) == code
     said = capsys.readouterr()
-    assert told in (said.err + said.out).lower()
+    assert lines in (said.err + said.out).lower()
     assert not (tmp_path / "report.html").exists()
 
 
@@ -130,12 +130,12 @@ def test_a_script_reads_verdict_numbers_and_drift_on_one_line(folder, model, tmp
     known = ["--model", str(model), "--against", str(model.parent)]
     assert run(["report", str(folder), *known, "--out", str(out), "--json"]) == 0
     (line,) = capsys.readouterr().out.splitlines()
-    told = json.loads(line)
-    assert (told["kind"], told["report"]) == ("calibeam-report", str(out))
-    assert told["trust"] in ("yes", "with care", "no")
-    assert told["numbers"]["now"]["value"] < 0.2 * told["numbers"]["as_drawn"]["value"]
-    assert "no drift shows" in told["drift"]
-    assert told["verdict"] in out.read_text()
+    lines = json.loads(line)
+    assert (lines["kind"], lines["report"]) == ("calibeam-report", str(out))
+    assert lines["trust"] in ("yes", "with care", "no")
+    assert lines["numbers"]["now"]["value"] < 0.2 * lines["numbers"]["as_drawn"]["value"]
+    assert "no drift shows" in lines["drift"]
+    assert lines["verdict"] in out.read_text()
     assert 'href="#drift"' in out.read_text()
 
 
@@ -148,8 +148,8 @@ def test_an_earlier_calibration_is_a_model_a_folder_or_a_recording(folder, model
 
 
 def test_an_arm_of_other_joints_is_not_compared(folder, model, tmp_path, capsys):
-    told = json.loads(model.read_text())
-    told["rig"]["text"] = told["rig"]["text"].replace(JOINT.format(a=0.4, alpha=0.0, d=0.0), "", 1)
-    model.write_text(json.dumps(told))
+    lines = json.loads(model.read_text())
+    lines["rig"]["text"] = lines["rig"]["text"].replace(JOINT.format(a=0.4, alpha=0.0, d=0.0), "", 1)
+    model.write_text(json.dumps(lines))
     assert run(["report", str(folder), "--against", str(model), "--out", str(tmp_path / "r.html")]) == 1
     assert "an arm with 4 joints, this one has 5" in capsys.readouterr().err

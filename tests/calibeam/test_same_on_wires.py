@@ -99,5 +99,5 @@ def eight_busy_loops() -> Iterator[None]:
 
 @pytest.mark.endure  # minutes: the session has a fraction of the machine
 @pytest.mark.usefixtures("eight_busy_loops")
-def test_a_session_beside_eight_busy_loops_is_completed(tmp_path: Path) -> None:
+def test_a_session_next_to_eight_busy_loops_is_completed(tmp_path: Path) -> None:
     assert len(on_wires(1.0, tmp_path)) == 10

@@ -35,24 +35,24 @@ def printed(recording, plan=None):
 
 
 def test_the_first_lines_are_the_report_s_verdict_and_no_name_of_a_status_is_printed(recording):
-    told, judged = printed(recording)
-    first = [line.strip() for line in told.splitlines()][: 3 + len(judged.reasons)]
+    lines, judged = printed(recording)
+    first = [line.strip() for line in lines.splitlines()][: 3 + len(judged.reasons)]
     assert first[:-1] == [judged.sentence, f"trust: {judged.trust.value}", *judged.reasons]
     assert first[-1].startswith("tool error over the workspace: ")
-    assert "RANK_DEFICIENT" not in told
+    assert "RANK_DEFICIENT" not in lines
 
 
 def test_zeros_stand_in_degrees_before_all_other_parameters_and_only_once(recording):
-    told, _ = printed(recording)
-    assert told.index("zero (deg)") < told.index("link2.length")
-    assert "J1 not determined: only in combination" in told
-    assert "joint2.zero" not in told
-    assert "point constraint" not in told
+    lines, _ = printed(recording)
+    assert lines.index("zero (deg)") < lines.index("link2.length")
+    assert "J1 not determined: only in combination" in lines
+    assert "joint2.zero" not in lines
+    assert "point constraint" not in lines
 
 
 def test_the_point_constraint_comes_after_the_zeros_of_the_fit_where_a_plan_names_it(recording):
-    told, _ = printed(recording, 'schema = 1\nmethod = "point-constraint"\nshare = 0\n')
-    assert told.index("link2.length") < told.index("for comparison: point constraint") < told.index("four poses at")
+    lines, _ = printed(recording, 'schema = 1\nmethod = "point-constraint"\nshare = 0\n')
+    assert lines.index("link2.length") < lines.index("for comparison: point constraint") < lines.index("four poses at")
 
 
 def test_a_plan_that_names_the_point_constraint_without_centred_poses_is_refused(recording):

@@ -15,7 +15,7 @@ from acquisition.errors import StoppedError
 from acquisition.wires.streams import Supervisor
 from calibeam import site_log
 from calibeam.outcome import PartialResult
-from calibeam.site_log import SITE_LOG, LogLevel, SiteLogFile, beside
+from calibeam.site_log import SITE_LOG, LogLevel, SiteLogFile, site_log_of
 from drivers.errors import DeviceLost
 
 LINE = re.compile(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{3}Z (DEBUG|INFO|WARNING|ERROR) [a-z_.]+: .+")
@@ -208,6 +208,6 @@ def test_a_stop_is_in_it_after_the_arm_has_it(recorded) -> None:
     assert "WARNING acquisition.wires.streams: STOP: pressed on the page" in lines
 
 
-def test_it_stands_beside_the_recording() -> None:
-    assert beside(Path("out/centre.mcap")) == Path("out/centre.log")
-    assert beside(Path("out/centre.log")) == Path("out/centre.log.log")
+def test_it_stands_next_to_the_recording() -> None:
+    assert site_log_of(Path("out/centre.mcap")) == Path("out/centre.log")
+    assert site_log_of(Path("out/centre.log")) == Path("out/centre.log.log")

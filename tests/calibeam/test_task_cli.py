@@ -151,12 +151,12 @@ def test_a_task_is_taught_run_and_gripped(rig: Path, belt: str, tmp_path: Path, 
     assert "nothing was moved" in capsys.readouterr().out
     assert outputs_and_joints(rig)[0] & 1 << 5 == 0
     assert run(command) == 0
-    told = capsys.readouterr().out
-    assert "the program ran to its end: 1 motion," in told
-    off = re.search(r"off the plan: largest ([0-9.]+) mm, rms ([0-9.]+) mm", told)
+    lines = capsys.readouterr().out
+    assert "the program ran to its end: 1 motion," in lines
+    off = re.search(r"off the plan: largest ([0-9.]+) mm, rms ([0-9.]+) mm", lines)
     assert off is not None
     assert 0.0 < float(off[2]) < float(off[1])
-    assert "solved at 100 Hz (10 x structural_hz 10 Hz of the rig file), sent at 500 Hz (15 x: 150 Hz, enough)" in told
+    assert "solved at 100 Hz (10 x structural_hz 10 Hz of the rig file), sent at 500 Hz (15 x: 150 Hz, enough)" in lines
     word, q_rad = outputs_and_joints(rig)
     assert word & 1 << 5
     tool = solver.flange(q_rad) @ transform((0.0, 0.0, 0.15))
@@ -174,9 +174,9 @@ def test_a_part_on_a_belt_is_met_where_the_belts_encoder_has_brought_it(rig: Pat
     graph = read_task(file).graph.with_value("PART", part)
     tool = solver_of(load_rig(rig)).flange(q_rad) @ transform((0.0, 0.0, 0.15))
     begin_m, tip_m = (graph.value("BELT") @ part)[:3, 3], tool[:3, 3]
-    along_m, beside_m = tip_m[1] - begin_m[1], np.hypot(tip_m[0] - begin_m[0], tip_m[2] - begin_m[2])
+    along_m, across_m = tip_m[1] - begin_m[1], np.hypot(tip_m[0] - begin_m[0], tip_m[2] - begin_m[2])
     assert 0.01 < along_m < 0.5  # the belt runs along the base's y at 20 mm/s
-    assert beside_m < 1e-4
+    assert across_m < 1e-4
 
 
 def test_a_task_with_nothing_left_to_teach_opens_no_device(tmp_path: Path, capsys) -> None:

@@ -87,7 +87,7 @@ def test_the_tool_is_found_within_its_sigma_and_the_rig_line_is_said(session, tm
     assert f"tool: {out}" in printed.replace("\n", "")
 
 
-def test_axes_are_told_by_joint_and_rows_of_the_file(session, tmp_path):
+def test_axes_are_reported_by_joint_and_rows_of_the_file(session, tmp_path):
     out = tmp_path / "tool.json"
     assert run(["tool-axes", str(session(4, 5)), "--out", str(out)]) == 0
     axes = json.loads(out.read_text())["axes"]
@@ -106,9 +106,9 @@ def test_json_prints_what_is_in_the_file(session, tmp_path, capsys):
 def test_missing_rotations_are_named_and_nothing_is_written(session, tmp_path, capsys):
     out = tmp_path / "tool.json"
     assert run(["tool-axes", str(session(3, 5)), "--out", str(out)]) == 1
-    told = capsys.readouterr().err
-    assert "rotations of joint 4 alone and 5 alone are needed" in told
-    assert "found single rotations of joint 3 (rows 2-16)" in told
+    lines = capsys.readouterr().err
+    assert "rotations of joint 4 alone and 5 alone are needed" in lines
+    assert "found single rotations of joint 3 (rows 2-16)" in lines
     assert not out.exists()
 
 

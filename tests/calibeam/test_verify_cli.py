@@ -10,7 +10,7 @@ import pytest
 from acquisition.recording import read, readings_sha256
 from acquisition.recording.rig import load_rig, rig_sha256, rig_text
 from calibeam.cli import run
-from calibeam.guided.recorded import BelievedGuidedArm
+from calibeam.guided.recorded import AssumedGuidedArm
 from calibrate.model.arms.catalogue import arm_of
 from calibrate.model.arms.eccentric import with_discs
 from calibrate.model.model_file import ModelFile, RigIdentity, write_model
@@ -31,7 +31,7 @@ def perfect_model() -> ModelFile:
 
 def session(folder: Path, off_m: float) -> Path:
     """A cone in ten postures of the drawn arm, every second one off; and a bar that is as long as it should be."""
-    arm, rng = BelievedGuidedArm.of_rig(RIG), np.random.default_rng(1)
+    arm, rng = AssumedGuidedArm.of_rig(RIG), np.random.default_rng(1)
 
     def postures(point_m, count):
         starts = rng.uniform(arm.lower_rad, arm.upper_rad, (200, 6))
@@ -115,7 +115,7 @@ def test_json_is_one_object_and_nothing_else(tmp_path: Path, model: Path, capsys
     assert json.loads(capsys.readouterr().out)["kind"] == "calibeam-verification"
 
 
-def test_a_session_without_artefacts_is_told(tmp_path: Path, model: Path, capsys) -> None:
+def test_a_session_without_artefacts_is_reported(tmp_path: Path, model: Path, capsys) -> None:
     folder = session(tmp_path / "none", 0.0)
     text = (folder / "samples.csv").read_text().splitlines()
     (folder / "samples.csv").write_text("\n".join(line.rsplit(",", 3)[0] for line in text) + "\n")

@@ -16,7 +16,7 @@ from calibeam.cli import EXTRAS
 
 ROOT = Path(__file__).parents[2]
 PROBE = """
-import calibeam.commands.demo as demo, calibeam.rig_files as files
+import calibeam.commands.demo, calibeam.rig_files as files
 from acquisition.recording.rig import load_rig
 assert str(files.RIGS).startswith({where!r}), files.RIGS
 print(load_rig(demo.RIG).name)
@@ -64,12 +64,12 @@ def test_the_wheel_does_the_main_job_in_an_environment_without_extras(tmp_path: 
     # A path in a .pth file is searched, but the .pth files in it are not read: so not that of the checkout either.
     blocked = f"import sys; sys.modules.update(dict.fromkeys({sorted(EXTRAS)}))"
     (site / "others.pth").write_text(f"{sysconfig.get_path('purelib')}\n{blocked}\n")
-    elsewhere = tmp_path / "elsewhere"
-    elsewhere.mkdir()
+    empty_folder = tmp_path / "elsewhere"
+    empty_folder.mkdir()
     plain = {name: value for name, value in os.environ.items() if not name.startswith(("PYTHON", "VIRTUAL_ENV", "COV"))}
 
     def said(*command: str | Path) -> str:
-        done = subprocess.run(command, cwd=elsewhere, env=plain, capture_output=True, text=True)
+        done = subprocess.run(command, cwd=empty_folder, env=plain, capture_output=True, text=True)
         assert done.returncode == 0, done.stderr
         return done.stdout
 
@@ -80,5 +80,5 @@ def test_the_wheel_does_the_main_job_in_an_environment_without_extras(tmp_path: 
     calibeam = fresh / "bin" / "calibeam"
     assert said(calibeam, "--version").strip() == version("calibeam")
     assert "Universal Robots UR5e" in said(calibeam, "rig", "list")
-    said(calibeam, "demo", "--out", elsewhere / "demo")
-    assert {"recording.mcap", "report.html"} <= {path.name for path in (elsewhere / "demo").iterdir()}
+    said(calibeam, "demo", "--out", empty_folder / "demo")
+    assert {"recording.mcap", "report.html"} <= {path.name for path in (empty_folder / "demo").iterdir()}

@@ -10,12 +10,12 @@ from calibrate.quantities import (
     TIED,
     aligned,
     angle,
+    angle_with_sigma,
     counted,
     decimals_of,
-    doubted_angle,
-    doubted_length,
     fixed,
     length,
+    length_with_sigma,
     significant,
     stated,
 )
@@ -49,13 +49,13 @@ def test_significant_digits_without_the_letter_e(value: float, said: str) -> Non
 
 
 @pytest.mark.parametrize(("sigma", "decimals"), [(0.00021, 5), (0.029, 3), (1.3, 1), (500.0, 0), (math.nan, 3)])
-def test_decimals_show_two_digits_of_the_doubt(sigma: float, decimals: int) -> None:
+def test_decimals_show_two_digits_of_the_uncertainty(sigma: float, decimals: int) -> None:
     assert decimals_of(sigma) == decimals
 
 
-def test_a_value_and_its_doubt_share_one_unit() -> None:
-    assert doubted_angle(3.117e-6, 1.62e-7) == f"3.12{TIED}±{TIED}0.16{TIED}µrad"
-    assert doubted_length(1.36e-7, 1.7e-8) == f"136{TIED}±{TIED}17{TIED}nm"
+def test_a_value_and_its_uncertainty_share_one_unit() -> None:
+    assert angle_with_sigma(3.117e-6, 1.62e-7) == f"3.12{TIED}±{TIED}0.16{TIED}µrad"
+    assert length_with_sigma(1.36e-7, 1.7e-8) == f"136{TIED}±{TIED}17{TIED}nm"
 
 
 def test_a_chosen_length_has_no_digits_that_nobody_chose() -> None:

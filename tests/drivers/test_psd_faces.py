@@ -115,7 +115,7 @@ def test_sigma_of_the_mean_is_the_scatter_of_means(kind):
     assert means[0].samples == 50
 
 
-def test_flicker_of_the_laser_is_no_doubt_of_position():
+def test_flicker_of_the_laser_is_no_uncertainty_of_position():
     rng = np.random.default_rng(6)
     brightness = 1.0 + 0.2 * rng.standard_normal((100, 1))
     mean = DUO.mean(brightness * currents_a(6e-3, -1e-3, 1e-4))

@@ -49,15 +49,15 @@ def worse(measured: str, published: str) -> list[str]:
     What is better than its bracket is no fault: then the table is to be published anew.
     """
     now, said = lines(measured), lines(published)
-    told = []
+    misses = []
     for label, line in said.items():
         if label not in now:
-            told.append(f"{label}: missing")
+            misses.append(f"{label}: missing")
             continue
         if now[label].n != line.n:
-            told.append(f"{label}: {now[label].n} cases, published {line.n}")
+            misses.append(f"{label}: {now[label].n} cases, published {line.n}")
         lower = any(word in label for word in LOWER_IS_BETTER)
         for one, bracket in zip(now[label].shares, line.shares, strict=True):
             if one.percent > bracket.high if lower else one.percent < bracket.low:
-                told.append(f"{label}: {one.percent} %, published {bracket.percent} % ({bracket.low}-{bracket.high})")
-    return told
+                misses.append(f"{label}: {one.percent} %, published {bracket.percent} % ({bracket.low}-{bracket.high})")
+    return misses

@@ -26,7 +26,7 @@ def _run(*words: str | Path) -> None:
     assert done.returncode == 0, done.stderr[-2000:]
 
 
-def test_a_table_that_is_worse_than_its_brackets_is_told() -> None:
+def test_a_table_that_is_worse_than_its_brackets_is_reported() -> None:
     table = frozen_table().read_text(encoding="utf-8")
     assert len(lines(table)) == 24
     assert worse(table, table) == []

@@ -80,17 +80,17 @@ def laser(by_m: np.ndarray, about_rad: np.ndarray) -> Change:
     )
 
 
-def laser_line(believed: DualPsd, own: DualPsd) -> np.ndarray:
+def laser_line(nominal: DualPsd, own: DualPsd) -> np.ndarray:
     """(4,) shifts and tilts of a laser's line about the believed one, across it: numbers of `laser.…` in a model.
 
     Where the line crosses the plane of the believed origin; axis u is the flange axis most across the believed beam.
     """
-    d = believed.laser_direction / np.linalg.norm(believed.laser_direction)
+    d = nominal.laser_direction / np.linalg.norm(nominal.laser_direction)
     axis = np.eye(3)[int(np.argmin(np.abs(d)))]
     u = (axis - (axis @ d) * d) / np.linalg.norm(axis - (axis @ d) * d)
     v = np.cross(d, u)
     along = own.laser_direction / (own.laser_direction @ d)
-    away = own.laser_origin_m - believed.laser_origin_m
+    away = own.laser_origin_m - nominal.laser_origin_m
     away = away - (away @ d) * along
     return np.array([away @ u, away @ v, along @ u, along @ v])
 

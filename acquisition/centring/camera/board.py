@@ -11,7 +11,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.centring.aim import BelievedArm
+from acquisition.centring.aim import AssumedArm
 from acquisition.centring.camera.model import CameraModel
 from acquisition.motion.kinematics import apart, flange, inverse
 from acquisition.recording.rig.schema import CameraBoard
@@ -123,7 +123,7 @@ class Sight:
     def __init__(self, eye: Eye, model: CameraModel, board: Board, T_psd1_board: Floats) -> None:
         self._eye, self._model, self._board, self._T_board_psd1 = eye, model, board, inverse(T_psd1_board)
 
-    def fixture(self, arm: BelievedArm, q_rad: Floats, T_base_fixture: Floats) -> Floats | None:
+    def fixture(self, arm: AssumedArm, q_rad: Floats, T_base_fixture: Floats) -> Floats | None:
         """T_base_psd1 (4, 4) for the assumed arm, which stands at `q_rad` (joint,); `T_base_fixture`: as assumed.
 
         None where the board is not in the picture. DeviceError of the camera.
@@ -135,12 +135,12 @@ class Sight:
         """Whether the board is in the picture now. DeviceError of the camera."""
         return self._board.find(self._eye.picture()) is not None
 
-    def before_camera(self, arm: BelievedArm, q_rad: Floats, T_base_fixture: Floats) -> Floats | None:
+    def before_camera(self, arm: AssumedArm, q_rad: Floats, T_base_fixture: Floats) -> Floats | None:
         """T_camera_psd1 (4, 4): of poses that fit alike the one nearer to what is assumed. As `fixture` otherwise."""
         seen = self._board.find(self._eye.picture())
         poses = [] if seen is None else board_poses(self._model, seen)
         if not poses:
             return None
-        believed = inverse(flange(arm, q_rad) @ self._model.T_flange_camera) @ T_base_fixture
+        assumed = inverse(flange(arm, q_rad) @ self._model.T_flange_camera) @ T_base_fixture
         alike = [T @ self._T_board_psd1 for T, rms in poses if rms <= ALIKE * poses[0][1]]
-        return min(alike, key=lambda T: apart(T, believed)[1])
+        return min(alike, key=lambda T: apart(T, assumed)[1])

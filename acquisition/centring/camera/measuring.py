@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from acquisition.bench import Bench
-from acquisition.centring.aim import BeamTarget, BelievedArm, flange_for, laser_in_flange, reach
+from acquisition.centring.aim import AssumedArm, BeamTarget, flange_for, laser_in_flange, reach
 from acquisition.centring.camera.board import Board, Eye, Sight
 from acquisition.centring.camera.calibration import Calibration, CameraStatus, View, calibrate_camera
 from acquisition.centring.camera.model import CameraFit, CameraModel, drawn
@@ -52,7 +52,7 @@ def viewpoints(model: CameraModel, radius_m: float) -> Iterator[Floats]:
 
 
 def stops(
-    arm: BelievedArm, model: CameraModel, T_base_board: Floats, radius_m: float, q_rad: Floats, rng: np.random.Generator
+    arm: AssumedArm, model: CameraModel, T_base_board: Floats, radius_m: float, q_rad: Floats, rng: np.random.Generator
 ) -> Iterator[Floats]:
     """Joint readings (joint,) of the nominal tour from `q_rad`; what the arm cannot reach is left out."""
     for T_board_camera in viewpoints(model, radius_m):
@@ -109,7 +109,7 @@ def line_before(T_camera_fixture: Floats, hit_m: Floats, direction: Floats) -> L
     return Line(R @ hit_m + T_camera_fixture[:3, 3], R @ direction)
 
 
-def onto_beam(model: CameraModel, lines: Sequence[Line], arm: BelievedArm) -> tuple[CameraModel, float, float]:
+def onto_beam(model: CameraModel, lines: Sequence[Line], arm: AssumedArm) -> tuple[CameraModel, float, float]:
     """The mount turned and shifted as little as brings the mean of `lines` onto the assumed laser; and their scatter:
 
     rms angle (rad) of the directions, rms distance (m) of the points struck from the mean line.

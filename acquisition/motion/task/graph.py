@@ -124,14 +124,14 @@ class TaskGraph:
     def _why_missing(self, name: str) -> str:
         why = f"{name} is missing ({self._source(name).why_unknown})"
         through = [str(relation) for relation in self.relations if name in relation.names]
-        others = [self._unknown_beside(relation, name) for relation in self.relations if name in relation.names]
+        others = [self._other_unknowns(relation, name) for relation in self.relations if name in relation.names]
         if not through:
             return why
         return why + "".join(
             f", {r} would give it with {' and '.join(o)}" for r, o in zip(through, others, strict=True)
         )
 
-    def _unknown_beside(self, relation: Equation, name: str) -> list[str]:
+    def _other_unknowns(self, relation: Equation, name: str) -> list[str]:
         return sorted(n for n in relation.names if n != name and self._source(n).at(0.0) is None)
 
     def _source(self, name: str) -> Source:

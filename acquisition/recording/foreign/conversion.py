@@ -196,7 +196,7 @@ def samples_of(table: Understanding) -> Samples:
     missing = [name for name in per_joint("q", "_rad", n_joints) if name not in columns]
     if missing:
         raise SamplesError(
-            f"{sheet.place()}: no columns are understood as the {n_joints} joint angles ({sheet.told}); state which "
+            f"{sheet.place()}: no columns are understood as the {n_joints} joint angles ({sheet.titles}); state which "
             f'they are: --columns "A1..A{n_joints} [deg] = q", or the row of the headings: --header-row'
         )
     if len(columns) == n_joints + 1:
@@ -305,13 +305,13 @@ def write_columns(about: Sequence[ColumnsFile], out: Path) -> Path:
 
     RecordingError where the disk refuses.
     """
-    beside = out.with_name(f"{out.name}.columns.json")
+    columns_path = out.with_name(f"{out.name}.columns.json")
     content = about[0] if len(about) == 1 else about
     try:
-        write_json(beside, content)
+        write_json(columns_path, content)
     except OSError as error:
-        raise RecordingError(f"{beside}: cannot be written ({error.strerror}); choose another place") from error
-    return beside
+        raise RecordingError(f"{columns_path}: cannot be written ({error.strerror}); choose another place") from error
+    return columns_path
 
 
 def _record(table: Understanding, group: Group, samples: Samples | None) -> ColumnRecord:

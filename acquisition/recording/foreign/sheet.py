@@ -32,7 +32,7 @@ GRID_CELLS = 200_000_000  # with the empty ones: of 12,000 rows with something i
 SHEETS = 100
 # Parts that are large in good workbooks: tables, texts, and what nobody reads unless a workbook names it as a sheet
 LARGE = ("xl/worksheets/", "xl/sharedStrings", "xl/charts/", "xl/drawings/", "xl/calcChain", "xl/pivotCache/")
-BESIDE_BYTES = 2_000_000  # of any other part
+OTHER_PART_BYTES = 2_000_000  # of any other part
 NUMBER = re.compile(r"[+-]?(?:\d++(?:\.\d*+)?|\.\d++)(?:[eE][+-]?\d+)?", re.ASCII)
 COMMA_NUMBER = re.compile(r"[+-]?(?:\d+,\d*|,\d+)(?:[eE][+-]?\d+)?", re.ASCII)
 NAMED = re.compile(r"[A-Za-z][A-Za-z #_.-]*(\d{1,6})", re.ASCII)  # such as R2
@@ -64,7 +64,7 @@ class Sheet:
         return f"{self.path}{sheet}{line}{heading}"
 
     @property
-    def told(self) -> str:
+    def titles(self) -> str:
         """The headings that are there, for a person."""
         at = f"row {self.heading_line} has the headings" if self.heading_line else "the columns are"
         some = [f"'{shown(h, 24)}'" for h in self.headings if h]
@@ -242,7 +242,7 @@ def _check_parts(path: Path) -> None:
     except (OSError, ValueError, zipfile.BadZipFile, NotImplementedError):
         return  # said by who opens it
     large = [part for part in parts if part.filename.startswith(LARGE)]
-    for those, most in ((large, UNPACKED_BYTES // 2), ([p for p in parts if p not in large], BESIDE_BYTES)):
+    for those, most in ((large, UNPACKED_BYTES // 2), ([p for p in parts if p not in large], OTHER_PART_BYTES)):
         for part in those:
             if part.file_size > most:
                 raise SamplesError(

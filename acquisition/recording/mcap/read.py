@@ -308,9 +308,9 @@ def _samples(content: Content, rig: Rig, path: Path) -> Samples:
 
 def _before_recovery(content: Content) -> tuple[str, ...]:
     """What `recover` could not save, as the file that it made states it."""
-    told = content.metadata.get(RECOVERY_METADATA, {})
-    lost = msgspec.json.decode(told.get("damage", "[]"), type=list[str])
-    return tuple(f"before its recovery from {told.get('source')}: {says}" for says in lost)
+    recovery = content.metadata.get(RECOVERY_METADATA, {})
+    lost = msgspec.json.decode(recovery.get("damage", "[]"), type=list[str])
+    return tuple(f"before its recovery from {recovery.get('source')}: {says}" for says in lost)
 
 
 def _undecodable(content: Content) -> tuple[str, ...]:

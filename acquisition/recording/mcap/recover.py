@@ -124,8 +124,8 @@ class _Copy:
             yield f"{self._lost_messages} messages of which the description is lost were left out"
 
     def finish(self, source: str, damage: tuple[str, ...], *, whole: bool) -> None:
-        told = {"source": source, "damage": msgspec.json.encode(damage).decode()}
-        self._metadata(RECOVERY_METADATA, told)
+        recovery = {"source": source, "damage": msgspec.json.encode(damage).decode()}
+        self._metadata(RECOVERY_METADATA, recovery)
         self._metadata(END_METADATA, {"complete": "true" if whole and self._complete else "false"})
         self.file.finish()
 

@@ -178,16 +178,16 @@ def correct(
     off_rad = before.error_rad + before.error_m / far_m  # what joints of a regular posture turn by, about
     singular = _near_singular(q_rad - nominal_rad, off_rad)
     status, says = _stated(arms, q_rad, why, beyond, singular, options.margin_rad)
-    told = np.full(wanted.T_base_tool.shape, np.nan)
+    as_stated = np.full(wanted.T_base_tool.shape, np.nan)
     good: Bools = np.asarray(np.isfinite(q_rad).all(axis=1))
-    told[good] = arms.drawn.frames(q_rad[good])[:, -1] @ arms.stated_tool
+    as_stated[good] = arms.drawn.frames(q_rad[good])[:, -1] @ arms.stated_tool
     if via_rad is not None:
         via_rad = np.where(good[:, None], via_rad, np.nan)
     if options.tool is not None:
         notes = (*notes, *arms.of_tool(after, options.tool_name))
     if arms.low_rad is None:
         notes = (*notes, "the model does not hold its recorded joint range: poses beyond it are not marked")
-    return Corrected(q_rad, nominal_rad, via_rad, told, before, after, status, says, notes)
+    return Corrected(q_rad, nominal_rad, via_rad, as_stated, before, after, status, says, notes)
 
 
 @dataclass(frozen=True, eq=False)

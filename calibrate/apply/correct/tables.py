@@ -97,14 +97,14 @@ def corrected_rows(found: Corrected, frame: Floats) -> tuple[list[str], list[lis
         for kind in ("error", "s_error")
     ]
     header = ["pose", "kind", "status", *joints, *place, *(name for name, _ in figures), "says"]
-    told = np.linalg.inv(frame) @ found.T_base_tool
+    in_frame = np.linalg.inv(frame) @ found.T_base_tool
     rows: list[list[str]] = []
     for row, status in enumerate(found.status):
         number = str(row + 1)
         if found.via_rad is not None and np.isfinite(found.via_rad[row]).all():
             empty = [""] * (len(place) + len(figures) + 1)
             rows.append([number, "approach", OK, *_cells(found.via_rad[row]), *empty])
-        T = told[row]
+        T = in_frame[row]
         turn = VECTOR.from_matrix(T[None, :3, :3])[0] if np.isfinite(T).all() else np.full(3, np.nan)
         numbers = [*found.q_rad[row], *T[:3, 3], *turn, *(values[row] for _, values in figures)]
         rows.append([number, "pose", status, *_cells(numbers), found.says[row]])

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from acquisition.recording.rig import ArmModel, Pose, Rig
 from calibrate.apply.export.identified import NO_NUMBER, IdentifiedArm, identified_arm
-from calibrate.fit.identify.estimates import ONLY_BELIEVED
+from calibrate.fit.identify.estimates import ONLY_ASSUMED
 from calibrate.fit.rank import STRUCTURAL, Identifiability, combinations_of
 from calibrate.model.arms.catalogue import arm_of
 from calibrate.model.arms.convert import Conversion, convert, pose_of
@@ -111,7 +111,7 @@ def dh_table_of(
     for i, name in enumerate(names):
         unit, sigma = "m" if name.endswith(("offset", "length")) else "rad", float(np.sqrt(J[i] @ covariance @ J[i]))
         moved = np.abs(J[i]) > SMALL
-        why = None if sigma < ONLY_PRIOR * np.linalg.norm((J[i] * prior)[moved]) else ONLY_BELIEVED
+        why = None if sigma < ONLY_PRIOR * np.linalg.norm((J[i] * prior)[moved]) else ONLY_ASSUMED
         if pulled[i] > PULLED or not np.isfinite(sigma):
             why = together.get(name, NO_NUMBER)
         if not np.any(moved):
@@ -150,8 +150,8 @@ def _together(
 ) -> dict[str, str]:
     """Number -> what it is seen together with: unseen directions in the numbers, base, target and fixture."""
     scaled = J / np.tile(PLAUSIBLE, len(names) // len(NAMES))[:, None]
-    beside = np.array([[(p is other) / p.plausible for p in free] for other in others]).reshape(-1, len(free))
-    rows = np.concatenate([scaled, beside]) @ seen.unseen
+    held_rows = np.array([[(p is other) / p.plausible for p in free] for other in others]).reshape(-1, len(free))
+    rows = np.concatenate([scaled, held_rows]) @ seen.unseen
     rows /= max(1.0, float(np.abs(rows).max(initial=0.0)))  # of wide tolerances, their rounding is as much larger
     weakest = STRUCTURAL * seen.singular_values.max(initial=0.0)
     never = _basis(rows[:, seen.singular_values[seen.rank :] < weakest])

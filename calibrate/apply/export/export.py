@@ -160,7 +160,7 @@ def export_model(path: Path, rig: Rig, model: ModelFile, form: ExportForm) -> tu
     says = _not_carried(model, tuple(soft)) if model.effects else ()
     with_links = any(name.startswith("link") and value != 0.0 for name, value in model.chain.items())
     if form.offsets:
-        says = (*_beside_offsets(model, with_links=with_links), *says)
+        says = (*_not_in_offsets(model, with_links=with_links), *says)
     if form.text is abb_moc_text:
         says = (*says, *without_ratio(rig))
     compliance = {int(e.where.removeprefix("joint").split(".")[0]): c for e, c in soft.values()}
@@ -223,7 +223,7 @@ def _not_carried(model: ModelFile, carried: tuple[str, ...]) -> tuple[str, ...]:
     return not_carried(model, carried).sentences
 
 
-def _beside_offsets(model: ModelFile, *, with_links: bool) -> tuple[str, ...]:
+def _not_in_offsets(model: ModelFile, *, with_links: bool) -> tuple[str, ...]:
     """What the nominal arm with the zeros of the model is off: from a whole model, or from the measured points."""
     from calibrate.apply.export.not_carried import geometry_lost, left_by_zeros
 

@@ -236,7 +236,7 @@ def sentences(
         k = bisect_left(begins, at)
         return k < len(begins) and OPENING.fullmatch(code, at, begins[k]) is not None
 
-    elsewhere = [
+    other_lines = [
         (move.line_start, f"{' '.join(move.text.split())}: its target is no literal of this file")
         for target, moves in by_name.items()
         if target not in known and not (target.isdigit() and written_out(int(target)))
@@ -249,7 +249,7 @@ def sentences(
             name = element[1]  # a number of a pose, or an element that only its index at run time chooses
         if name in used | arrays and not written_out(match.end()):
             line = code[match.start("name") :].split("\n", 1)[0]
-            elsewhere.append((match.start("name"), f"{shown(line)}: changes a target while the program runs"))
-    listed = {line_of(code, at) for at, _ in elsewhere}
+            other_lines.append((match.start("name"), f"{shown(line)}: changes a target while the program runs"))
+    listed = {line_of(code, at) for at, _ in other_lines}
     more = [(at, why) for at, why in others if line_of(code, at) not in listed]  # an instruction is listed once
-    return tuple(dict.fromkeys(f"line {line_of(code, at)}: {why}" for at, why in (*elsewhere, *more)))
+    return tuple(dict.fromkeys(f"line {line_of(code, at)}: {why}" for at, why in (*other_lines, *more)))

@@ -123,7 +123,7 @@ def correct_program(
         wanted.near_rad[row] = joints_rad
     found = correct(model, replace(wanted, source=name), inverse_of, options)
     pieces, q_rad = list[tuple[int, int, str]](), found.q_rad.copy()
-    told = inverse(base) @ found.T_base_tool
+    in_base = inverse(base) @ found.T_base_tool
     for row, one in enumerate(targets.literals):
         if not np.isfinite(found.q_rad[row]).all():
             continue
@@ -131,7 +131,7 @@ def correct_program(
             written = dialect.joint_numbers(found.q_rad[row])
             q_rad[row] = dialect.joints_rad([float(v) for v in written])
         else:
-            written = dialect.pose_numbers(told[row, :3, 3], told[row, :3, :3])
+            written = dialect.pose_numbers(in_base[row, :3, 3], in_base[row, :3, :3])
             q_rad[row] = _commanded(arms, dialect, base[row], written, found.q_rad[row], inverse_of)
         pieces += [(*span, number) for span, number in zip(one.spans, written, strict=True)]
         pieces += [(*span, number) for span, number in (one.turns(found.q_rad[row]) if one.turns else ())]

@@ -36,8 +36,7 @@ from calibrate.diagnose.assess.diagnosis import (
 )
 from calibrate.diagnose.assess.findings import bare_findings, findings_of, named
 from calibrate.diagnose.assess.lack_of_fit import LackOfFit, lack_of_fit
-from calibrate.diagnose.assess.missing_columns import TIME, suspects
-from calibrate.diagnose.assess.missing_columns import untold as drift_not_determined
+from calibrate.diagnose.assess.missing_columns import TIME, drift_not_determined, suspects
 from calibrate.diagnose.assess.rivals import Rival, price, rivals_of
 from calibrate.diagnose.assess.unknown import with_unknowns
 from calibrate.diagnose.assess.unrecorded import Unrecorded, unrecorded
@@ -115,10 +114,10 @@ def assessed(
     final = not left and not stages.undecided
     drifting = {i: hidden for i, a in enumerate(at.state.accepted) if (hidden := suspects(named(a.term), missing))}
     would = {scatter.port.where} if scatter is not None and scatter.missing else set[str]()
-    untold = {*drifting, *lagging, *(i for i, a in enumerate(at.state.accepted) if a.term.port.where in would)}
+    unsized = {*drifting, *lagging, *(i for i, a in enumerate(at.state.accepted) if a.term.port.where in would)}
     weighed = not any(m.driver in LOADS for m in missing)
     findings = stages.attempt(
-        Stage.SIZES, lambda: findings_of(at, rivals, predicts(at.bench), final, untold, weighed), bare_findings(at)
+        Stage.SIZES, lambda: findings_of(at, rivals, predicts(at.bench), final, unsized, weighed), bare_findings(at)
     )
     where = {at.state.accepted[i].term.port.where: hidden for i, hidden in drifting.items()}
     drifts = [(f, where[f.name.where]) for f in findings if f.name.where in where and f.name.physics == UNKNOWN]
@@ -274,8 +273,8 @@ def predicts(bench: Bench) -> Floats:
             without = bench.sight.residual + gone.span @ gone.part
             saved = np.bincount(part, (_unseen_squares(basis, without, folds, bench.geometry) - whole)[data])[met]
             out[i] = min(out[i], np.sum(saved) - np.std(saved) * np.sqrt(len(saved)))
-            told = float(np.sum(without[rows.stated] ** 2) - np.sum(bench.sight.residual[rows.stated] ** 2))
-            known[i] = max(told - 2.0 * gone.cost, 0.0)
+            gained = float(np.sum(without[rows.stated] ** 2) - np.sum(bench.sight.residual[rows.stated] ** 2))
+            known[i] = max(gained - 2.0 * gone.cost, 0.0)
     return out + known
 
 

@@ -116,10 +116,10 @@ def _smallest(bench: Bench, i: int, coefficients: Floats | None) -> Smallest | N
     entry = bench.menu.entries[i]
     term, k = bench.menu.terms[entry.term], len(coefficients)
     sizes = term.sizes(coefficients, np.zeros((k, k)), entry.inner, np.zeros(len(entry.inner)))
-    told = {name: abs(s.value) for name, s in sizes.items() if not name.startswith(NO_SIZE) and s.value != 0.0}
-    if not told:
+    sized = {name: abs(s.value) for name, s in sizes.items() if not name.startswith(NO_SIZE) and s.value != 0.0}
+    if not sized:
         return None
-    name, value = next(iter(told.items()))
+    name, value = next(iter(sized.items()))
     if not math.isfinite(value):
         return None
     return Smallest(named(term), name, value, term.plausible(coefficients, entry.inner, bench.noise_rad))

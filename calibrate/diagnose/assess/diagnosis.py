@@ -41,7 +41,7 @@ class Named:
     order: int | None
     physics: str
 
-    def beside(self, other: "Named") -> str:
+    def compared_with(self, other: "Named") -> str:
         """In words; with the driver where place and physics are those of the other name."""
         words = f"{self.physics} at {self.where}"
         if (self.physics, self.where) != (other.physics, other.where):
@@ -87,7 +87,7 @@ class Finding:
     pulled: Pulled | None
     variant: str = ""  # of its term: which station or cone of several
 
-    def believed(self, share: float) -> "Finding":
+    def weakened(self, share: float) -> "Finding":
         """As sure by a share: what its name loses goes to no name, hence its alternatives lose as much."""
         less = tuple(replace(r, confidence=share * r.confidence) for r in self.rivals)
         return replace(self, confidence=share * self.confidence, rivals=less)

@@ -64,13 +64,13 @@ def findings_of(
     rivals: Sequence[Sequence[Rival]],
     predicts: Floats,
     final: bool = True,
-    untold: Collection[int] = (),
+    unsized: Collection[int] = (),
     weighed: bool = True,
 ) -> tuple[Finding, ...]:
     """Largest first. `rivals` of each term; `predicts` (term,) as `calibrate/diagnose/assess/assessment.py` gives it.
 
     All that is unknown at one port is one finding. `final`: no structure is left without a name; while some is, no
-    name of physics is more likely than not. `untold`: terms that a column which was not recorded would explain; their
+    name of physics is more likely than not. `unsized`: terms that a column which was not recorded would explain; their
     names are alternatives only. `weighed`: all that the arm carries is stated and recorded.
     """
     accepted = at.state.accepted
@@ -81,10 +81,10 @@ def findings_of(
     unknown = [unknown_cause(at, group, predicts) for group in unnamed]
     loads = [f for f in names if _by_weight(f.name)]
     slight = [any(_misweighed(f, load, weighed) for load in loads) for f in names]
-    doubtful = [less or not (final and _final(f, unknown)) for f, less in zip(names, slight, strict=True)]
-    names = [f.believed(NOT_FINAL) if less else f for f, less in zip(names, doubtful, strict=True)]
+    not_final = [less or not (final and _final(f, unknown)) for f, less in zip(names, slight, strict=True)]
+    names = [f.weakened(NOT_FINAL) if less else f for f, less in zip(names, not_final, strict=True)]
     sure = [
-        i not in untold and f.confidence >= limits.LEAST_CONFIDENCE and _sized(f)
+        i not in unsized and f.confidence >= limits.LEAST_CONFIDENCE and _sized(f)
         for i, f in zip(closed, names, strict=True)
     ]
     names = [f if ok else _unsure(at, i, f, predicts) for i, f, ok in zip(closed, names, sure, strict=True)]
@@ -97,15 +97,15 @@ def _sized(finding: Finding) -> bool:
     """Whether its size is certain to be one: a name of nothing in particular is none. Of several sizes, as of a move,
     each may be vague and all together plain; those that the data do not determine decide nothing.
     """
-    told = [size for name, size in finding.parameters.items() if not name.startswith(NO_SIZE)]
-    return len(told) != 1 or not abs(told[0].value) < limits.SIZE_SIGMAS * told[0].sigma < np.inf
+    sized = [size for name, size in finding.parameters.items() if not name.startswith(NO_SIZE)]
+    return len(sized) != 1 or not abs(sized[0].value) < limits.SIZE_SIGMAS * sized[0].sigma < np.inf
 
 
 def _unsure(at: Search, i: int, finding: Finding, predicts: Floats) -> Finding:
     """The unknown cause in the place of a name that is hardly likely, or of no certain size. The name stays among what
     it could be; all names together are no more likely than not.
     """
-    found, assessed = unknown_cause(at, (i,), predicts), finding.believed(NOT_FINAL)
+    found, assessed = unknown_cause(at, (i,), predicts), finding.weakened(NOT_FINAL)
     rivals = (RivalName(assessed.name, assessed.confidence, 0.0, refitted=True), *assessed.rivals)
     left = max(found.confidence - sum(rival.confidence for rival in rivals), 0.0)
     return replace(found, confidence=left, rivals=rivals, variant=finding.variant)
@@ -172,7 +172,7 @@ def _by_weight(name: Named) -> bool:
 def _finding(at: Search, i: int, rivals: Sequence[Rival], predicts: float) -> Finding:
     """Its share as a square, not divided by that of all."""
     bench, a = at.bench, at.state.accepted[i]
-    belief = confidences(bench, a.term, rivals)
+    posterior = confidences(bench, a.term, rivals)
     same = np.array(
         [True, *(r.term.port.where == a.term.port.where and r.term.physics == a.term.physics for r in rivals)]
     )
@@ -182,14 +182,14 @@ def _finding(at: Search, i: int, rivals: Sequence[Rival], predicts: float) -> Fi
         name=named(a.term),
         parameters=sizes,
         share=bench.gone[i].squares,
-        confidence=NAMED * float(belief[same].sum()) * (1.0 - p),
+        confidence=NAMED * float(posterior[same].sum()) * (1.0 - p),
         p=p,
         gain=gain_of(bench.gone[i], bench.sight),
         predicts=predicts,
         says=a.term.says(sizes),
         rivals=tuple(
             _rival(bench, a, r, NAMED * float(b) * (1.0 - p))
-            for r, b, own in zip(rivals, belief[1:], same[1:], strict=True)
+            for r, b, own in zip(rivals, posterior[1:], same[1:], strict=True)
             if not own or (r.term.order, r.term.depends_on) != (a.term.order, a.term.depends_on)
         ),
         pulled=pulled_back(bench, a),
@@ -197,12 +197,12 @@ def _finding(at: Search, i: int, rivals: Sequence[Rival], predicts: float) -> Fi
     )
 
 
-def _rival(bench: Bench, own: Accepted, rival: Rival, belief: float) -> RivalName:
+def _rival(bench: Bench, own: Accepted, rival: Rival, posterior: float) -> RivalName:
     other = rival.accepted
     inner = own.inner if other.term.inner == own.term.inner else other.inner  # both were fitted, hence not quite equal
     pair = ((own.term, own.inner), (other.term, inner))
     alike = _alike(*(orthonormal(bench.state.columns(term, values)) for term, values in pair))
-    return RivalName(named(rival.term), belief, rival.margin, rival.refitted, alike, rival.plausible)
+    return RivalName(named(rival.term), posterior, rival.margin, rival.refitted, alike, rival.plausible)
 
 
 def _alike(one: Floats, other: Floats) -> bool:
@@ -229,9 +229,9 @@ def pieces(accepted: Sequence[Accepted], places: int) -> list[tuple[int, ...]]:
     return [tuple(group) for group in found.values() if _meet_too_often(len(group), names - len(group), places)]
 
 
-def _meet_too_often(here: int, elsewhere: int, places: int) -> bool:
+def _meet_too_often(here: int, at_others: int, places: int) -> bool:
     """Whether so many names at one of the places are no chance, at the rate of all others."""
-    rate = (elsewhere + limits.UNSEEN_FAULTS) / max(places - 1, 1)
+    rate = (at_others + limits.UNSEEN_FAULTS) / max(places - 1, 1)
     return here >= limits.FAULTS_AT_ONE_PLACE and float(pdtrc(here - 1, rate)) * places < limits.FAULTS_BY_CHANCE
 
 

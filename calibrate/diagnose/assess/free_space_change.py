@@ -50,7 +50,7 @@ def free_space_change(before: Fitted, after: Fitted, rng: Generator) -> FreeSpac
     for i, accepted in enumerate(after.accepted):
         if not moves_tool(accepted.term):
             continue
-        basis = _told(accepted, after.drivers, q_rad, frames, like)
+        basis = _moved_by(accepted, after.drivers, q_rad, frames, like)
         if basis is None:
             return None
         by = by.plus(accepted.term.port, basis @ accepted.coefficients)
@@ -61,12 +61,14 @@ def free_space_change(before: Fitted, after: Fitted, rng: Generator) -> FreeSpac
     alone = perturbed_frames(session.arm, before.geometry[:n_arm], q_rad, nothing)[:, -1]
     point_m = _target_m(after)
     # At the poses of the twists: frames that are unknown would else be taken out a little askew, and they are far off.
-    doubt = _doubt(after, frames[:, -1], point_m, np.concatenate([arm, *slopes], axis=2), [*range(n_arm), *columns])
+    variance = _variance(
+        after, frames[:, -1], point_m, np.concatenate([arm, *slopes], axis=2), [*range(n_arm), *columns]
+    )
     missed = _missed(alone, truth, point_m)
-    return FreeSpaceChange(float(np.sqrt(missed + doubt)), float(np.sqrt(doubt)), limits.WORKSPACE_POSES)
+    return FreeSpaceChange(float(np.sqrt(missed + variance)), float(np.sqrt(variance)), limits.WORKSPACE_POSES)
 
 
-def _told(accepted: Accepted, drivers: Drivers, q_rad: Floats, frames: Floats, like: Ints) -> Floats | None:
+def _moved_by(accepted: Accepted, drivers: Drivers, q_rad: Floats, frames: Floats, like: Ints) -> Floats | None:
     """(pose, width, coefficient) what a term adds at the poses, some at a time; None: it has no value there."""
     copies = max(1, int(np.ceil(limits.POSES_FOR_ONE_NEW * AT_ONCE / len(drivers.q_rad))))
     parts: list[Floats] = []
@@ -86,7 +88,7 @@ def _target_m(state: Fitted) -> Floats:
     return np.zeros(3) if drawn is None else np.array(drawn)
 
 
-def _doubt(state: Fitted, T_base_flange: Floats, point_m: Floats, twists: Floats, columns: list[int]) -> float:
+def _variance(state: Fitted, T_base_flange: Floats, point_m: Floats, twists: Floats, columns: list[int]) -> float:
     """Mean square of the target's uncertainty over the poses, three axes together."""
     points = _at(T_base_flange, point_m)
     slope = twists[:, :3] - cross_matrix(points) @ twists[:, 3:]

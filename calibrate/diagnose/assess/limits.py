@@ -54,7 +54,7 @@ REFITTED_TERMS = 4  # terms; in larger models no alternative is refitted, since 
 REFITTED_SAMPLES = 800  # samples; the same of larger sessions
 # prior odds of other names for one pattern that turns with weight, against a soft joint. A harmonic drive yields 10 to
 # 70 µrad/Nm (mismatch catalogue); a bolted foot, a cast link and a flanged tool are several times as stiff
-ODDS_BESIDE_COMPLIANCE = {"base-compliance": 1.0 / 2.0, "link-bending": 1.0 / 4.0, "tool-sag": 1.0 / 8.0}
+ODDS_WITH_COMPLIANCE = {"base-compliance": 1.0 / 2.0, "link-bending": 1.0 / 4.0, "tool-sag": 1.0 / 8.0}
 
 # Unseen rows and the noise floor
 UNSEEN_SHARE = 0.2  # share of the samples that are left out

@@ -51,14 +51,14 @@ def separated_by_time(one: Named, other: Named) -> bool:
     return one.where == other.where and all(map(is_slow_cause, (*one.depends_on, *other.depends_on)))
 
 
-def doubtful(finding: Finding) -> Finding:
+def not_final_drift(finding: Finding) -> Finding:
     """A drift whose name is not final."""
     if finding.name.physics == UNKNOWN:
         return finding
-    return finding.believed(NOT_FINAL / max(finding.confidence, NOT_FINAL))
+    return finding.weakened(NOT_FINAL / max(finding.confidence, NOT_FINAL))
 
 
-def untold(finding: Finding, lacking: Sequence[Missing]) -> Unexplained:
+def drift_not_determined(finding: Finding, lacking: Sequence[Missing]) -> Unexplained:
     """What cannot be determined of a drift, and the columns that would show it."""
     columns = ", ".join(dict.fromkeys(m.column for m in lacking))
     why = f"it changes along the session, and what it follows cannot be determined; missing column: {columns}"

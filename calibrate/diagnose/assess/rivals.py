@@ -67,7 +67,7 @@ def price(bench: Bench, term: Term) -> float:
     The thermometer at the place itself is free, any other one is one of many. Source: extended BIC, Chen, Chen,
     Biometrika 95(3), 2008, gamma = 1.
     """
-    odds = -2.0 * float(np.log(limits.ODDS_BESIDE_COMPLIANCE.get(term.physics, 1.0)))
+    odds = -2.0 * float(np.log(limits.ODDS_WITH_COMPLIANCE.get(term.physics, 1.0)))
     driver, where = term.depends_on[0], term.port.where
     if not driver.startswith(WARMTH) or where.startswith(driver.removeprefix(WARMTH) + "."):
         return odds
@@ -84,8 +84,8 @@ def confidences(bench: Bench, own: Term, rivals: Sequence[Rival]) -> Floats:
     named = np.array([True, *(r.plausible for r in rivals)])
     margins = np.where(named, np.maximum(margins, 0.0), margins)
     weights = np.exp(-0.5 * (margins - margins.min()))
-    belief = weights / weights.sum()
-    return np.asarray(np.where(named, belief, np.minimum(belief, belief[0])), dtype=np.float64)
+    posterior = weights / weights.sum()
+    return np.asarray(np.where(named, posterior, np.minimum(posterior, posterior[0])), dtype=np.float64)
 
 
 def _near(bench: Bench, gone: Removed, worth: float, taken: frozenset[Key]) -> list[Rival]:

@@ -72,8 +72,8 @@ class NoiseFound:
         return f"{_times(self.times)} × the stated noise of the {noun} is left {size}{why}"
 
 
-def noise_found(model: Fitted, rng: Generator, *, elsewhere: bool) -> tuple[NoiseFound, ...]:
-    """Of every instrument that reads the arm. `elsewhere`: structure is known to be left, so that nothing is noise."""
+def noise_found(model: Fitted, rng: Generator, *, unnamed: bool) -> tuple[NoiseFound, ...]:
+    """Of every instrument that reads the arm. `unnamed`: structure is known to be left, so that nothing is noise."""
     larger = freedom(model.problem, model.values, model.covariance)
     out: list[NoiseFound] = []
     seen = {u.instrument: u for u in model.held_out(model.active)}
@@ -81,7 +81,7 @@ def noise_found(model: Fitted, rng: Generator, *, elsewhere: bool) -> tuple[Nois
         if measured.name == ENCODER_DIFFERENCE or measured.name not in seen:
             continue
         for quantity in kind_of(measured.name).quantities:
-            out.append(_found(model, i, quantity, seen[measured.name], float(larger[i]), rng, elsewhere=elsewhere))
+            out.append(_found(model, i, quantity, seen[measured.name], float(larger[i]), rng, unnamed=unnamed))
     return tuple(out)
 
 
@@ -97,7 +97,7 @@ def hidden_of(missing: Sequence[Missing]) -> tuple[Missing, ...]:
 
 
 def _found(
-    model: Fitted, i: int, quantity: Quantity, unseen: UnseenMisfits, larger: float, rng: Generator, *, elsewhere: bool
+    model: Fitted, i: int, quantity: Quantity, unseen: UnseenMisfits, larger: float, rng: Generator, *, unnamed: bool
 ) -> NoiseFound:
     name, misfit = unseen.instrument, unseen.misfit[:, quantity.part]
     stated = _stated(model, i, quantity)
@@ -114,7 +114,7 @@ def _found(
         supports, opposes = _evidence(model, i, quantity, unseen, good, rng)
         if supports + opposes and times > limits.STATEMENT_WRONG_BY:
             opposes = (f"no statement is wrong by more than {limits.STATEMENT_WRONG_BY:.0f} times", *opposes)
-        noise = Statement.EXCEEDED if opposes or elsewhere else Statement.WRONG
+        noise = Statement.EXCEEDED if opposes or unnamed else Statement.WRONG
         answer = noise if supports + opposes else Statement.UNTESTED
     said, sigma = float(np.sqrt(np.mean(stated**2))), float(error / max(2.0 * times, 1e-300))
     return NoiseFound(name, quantity.name, quantity.unit, said, found, times, sigma, answer, supports, opposes)
@@ -160,12 +160,12 @@ def _evidence(
     misfit, sample, drivers = unseen.misfit[good][:, quantity.part], unseen.sample[good], model.drivers
     if len(misfit) < limits.NOISE_OBSERVATIONS:
         return (), ()
-    told = [
+    tried = [
         _close_in_time(misfit, np.array([]) if drivers.repeat is None else drivers.repeat[sample], sample),
         _by_lever(*_whitened(model, i, quantity, misfit, good), stated=model.session.rig.noise.joint_rad is not None),
         _by_posture(misfit, drivers.q_rad[sample], sample, rng),
     ]
-    given = [one for one in told if one is not None]
+    given = [one for one in tried if one is not None]
     return tuple(words for good, words in given if good), tuple(words for good, words in given if not good)
 
 

@@ -167,7 +167,7 @@ def _remaining(at: Search, vanished: frozenset[Key], least: float) -> Search | N
     """With the best open term of more than the `least` gain that is not `vanished`."""
     families = open_families(at.bench)
     law = noise_law(at.state.rows, at.bench.sight, at.state.drivers.t_s, at.rng)
-    free = _beside([a.term for a in at.state.accepted])
+    free = _not_accepted([a.term for a in at.state.accepted])
 
     def allowed(term: Term) -> bool:
         return free(term) and term.key not in vanished and not (law.wanders and is_slow(term))
@@ -176,11 +176,11 @@ def _remaining(at: Search, vanished: frozenset[Key], least: float) -> Search | N
     p = 1.0 if offer is None else _p_of(at, families, law, offer, allowed)
     if offer is not None and _follows_room(offer.term) and p > limits.ROOM_ALPHA:
 
-        def elsewhere(term: Term) -> bool:
+        def at_other_places(term: Term) -> bool:
             return allowed(term) and not _follows_room(term)
 
-        offer = families.best(None, elsewhere, least)
-        p = 1.0 if offer is None else _p_of(at, families, law, offer, elsewhere)
+        offer = families.best(None, at_other_places, least)
+        p = 1.0 if offer is None else _p_of(at, families, law, offer, at_other_places)
     if offer is None or p > search_limits.ALPHA_FURTHER:
         return None
     new = fitted_curve(at.bench, offer, None)
@@ -195,7 +195,7 @@ def _best_name(at: Search) -> float:
     return float(np.max(at.bench.scores.gain, where=free, initial=0.0))
 
 
-def _beside(accepted: Sequence[Term]) -> Allowed:
+def _not_accepted(accepted: Sequence[Term]) -> Allowed:
     """What is not one more function of the same drivers at the same place: two of those balance each other."""
     return lambda term: not any(_balance(term, other) for other in accepted)
 

@@ -11,7 +11,7 @@ from calibrate.diagnose import limits
 from calibrate.diagnose.assess.diagnosis import Diagnosis, Named
 from calibrate.diagnose.assess.findings import named
 from calibrate.diagnose.assess.missing_columns import separated_by_time
-from calibrate.diagnose.new_poses.longer_session import Elsewhere, NewPoses, elsewhere
+from calibrate.diagnose.new_poses.longer_session import LongerSession, NewPoses, at_new_poses
 from calibrate.diagnose.new_poses.next_poses import Contest, Duel, next_poses, reach_of
 from calibrate.diagnose.new_poses.reachable import reachable
 from calibrate.diagnose.search.bench import Bench
@@ -44,7 +44,7 @@ def separating(diagnosis: Diagnosis, rng: Generator, count: int = limits.NEW_POS
     if not rivals:
         return None
     offered = reachable(state, rng)
-    there, pairs, duels = elsewhere(state, offered), list[tuple[Named, Named]](), list[Duel]()
+    there, pairs, duels = at_new_poses(state, offered), list[tuple[Named, Named]](), list[Duel]()
     for i, rival in rivals:
         found = duel(there, i, rival)
         if found is not None and reach_of(found) > limits.SEPARABLE:
@@ -57,7 +57,7 @@ def separating(diagnosis: Diagnosis, rng: Generator, count: int = limits.NEW_POS
     return NextPoses(offered.take(chosen.poses), _spots(there)[chosen.poses], tuple(pairs), before, after)
 
 
-def duel(there: Elsewhere, i: int, rival: Accepted) -> Duel | None:
+def duel(there: LongerSession, i: int, rival: Accepted) -> Duel | None:
     """Of accepted term i and an alternative in its place; None where a term knows the measured poses only."""
     own, against = there.carried(there.state.accepted[i]), there.carried(rival)
     others = [there.carried(a) for j, a in enumerate(there.state.accepted) if j != i]
@@ -65,8 +65,8 @@ def duel(there: Elsewhere, i: int, rival: Accepted) -> Duel | None:
         return None
     measured, new = there.fitted_along([*(a for a in others if a is not None), against])
     adds, adds_new = there.added(own)
-    beliefs = np.zeros(len(measured) - len(adds))
-    return Duel(measured, np.concatenate([adds, beliefs]), Contest(adds_new, new))
+    prior_rows = np.zeros(len(measured) - len(adds))
+    return Duel(measured, np.concatenate([adds, prior_rows]), Contest(adds_new, new))
 
 
 def rival_named(state: Fitted, i: int, name: Named) -> Accepted | None:
@@ -81,7 +81,7 @@ def rival_named(state: Fitted, i: int, name: Named) -> Accepted | None:
     return refined(bench, menu.terms[best.term], best.inner, gone)
 
 
-def _spots(there: Elsewhere) -> Floats:
+def _spots(there: LongerSession) -> Floats:
     n = len(there.state.session.samples)
     out = np.full((len(there.session.samples) - n, 4), np.nan)
     for m, expected in zip(there.session.measured, there.around.expected, strict=True):

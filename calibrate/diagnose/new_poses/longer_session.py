@@ -49,7 +49,7 @@ class NewPoses:
 
 
 @dataclass(frozen=True, eq=False)
-class Elsewhere:
+class LongerSession:
     """Measured and new poses under one model; whitened by the noise that was found."""
 
     state: Fitted
@@ -94,7 +94,7 @@ class Elsewhere:
         amount = accepted.at(self.drivers)[..., None]
         columns = columns_of(self.session.measured, accepted.term.port, amount, self.around)
         seen = self._problem().whitened(columns)
-        measured, new = self._parted(seen)
+        measured, new = self._split(seen)
         return measured[:, 0], new[..., 0]
 
     def fitted_along(self, terms: Sequence[Accepted]) -> tuple[Floats, Floats]:
@@ -112,14 +112,14 @@ class Elsewhere:
         ends = np.cumsum([len(r) * W.shape[-1] for r, W in zip(self.rows, self.whiteners, strict=True)])
         parts = np.split(slope, ends)
         seen = [p.reshape(-1, W.shape[-1], len(free)) for p, W in zip(parts, self.whiteners, strict=False)]
-        measured, new = self._parted(seen)
+        measured, new = self._split(seen)
         return np.concatenate([measured, parts[-1], np.diag(scale / sigma)]), new
 
     def _problem(self, terms: Sequence[Accepted] = (), sizes: tuple[Floats, ...] = ()) -> EffectProblem:
         chain = self.session.chain(terms, self.drivers)
         return EffectProblem(self.session, chain, self.rows, self.whiteners, sizes, shared=self.shared)
 
-    def _parted(self, seen: Sequence[Floats]) -> tuple[Floats, Floats]:
+    def _split(self, seen: Sequence[Floats]) -> tuple[Floats, Floats]:
         """(row, m) of measured rows and (pose, k of all instruments, m) of new ones, zero where none reads."""
         n, m = len(self.state.session.samples), seen[0].shape[-1]
         measured: list[Floats] = []
@@ -133,7 +133,7 @@ class Elsewhere:
         return np.concatenate(measured), new
 
 
-def elsewhere(state: Fitted, poses: NewPoses) -> Elsewhere:
+def at_new_poses(state: Fitted, poses: NewPoses) -> LongerSession:
     """A fitted session, and what it predicts of new poses. Bars, which a hand lays out, read nothing there."""
     n = len(state.session.samples)
     samples = _behind(state, poses)
@@ -147,7 +147,7 @@ def elsewhere(state: Fitted, poses: NewPoses) -> Elsewhere:
     plain = session.chain()
     bare = plain.at(state.geometry)
     drivers, shared = _drivers(session, bare, state, poses), _shared(state, plain, bare)
-    found = Elsewhere(state, session, drivers, bare, rows, whiteners, shared)
+    found = LongerSession(state, session, drivers, bare, rows, whiteners, shared)
     carried = (*found.brought, *(a for a in map(found.carried, state.accepted) if a is not None))
     chain = session.chain(carried, drivers)
     around = chain.at(np.concatenate([state.geometry, chain.of_effects]))

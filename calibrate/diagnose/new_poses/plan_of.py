@@ -61,6 +61,6 @@ def short_way(q_rad: Floats) -> Ints:
 
 
 def _purpose(found: NextPoses) -> tuple[str, ...]:
-    told = [f"separates {a.beside(b)} from {b.beside(a)}" for a, b in dict.fromkeys(found.pairs)]
+    separated = [f"separates {a.compared_with(b)} from {b.compared_with(a)}" for a, b in dict.fromkeys(found.pairs)]
     margin = f"margin to expect of the closest pair: {found.before:.0f} BIC before, {found.after:.0f} with these poses"
-    return (*told, margin)
+    return (*separated, margin)

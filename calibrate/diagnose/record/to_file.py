@@ -62,7 +62,7 @@ ANGULAR = ("angle", "tilt", "twist", "direction")
 def file_of(diagnosed: Diagnosed, recording: Recording) -> DiagnosisFile:
     """The record to write."""
     rig = RigRecord(recording.rig.name, rig_sha256(recording.rig_text))
-    blunders = tuple(map(_blunder, diagnosed.blunders))
+    gross_errors = tuple(map(_gross_error, diagnosed.blunders))
     if diagnosed.physics is None:
         return DiagnosisFile(
             schema=SCHEMA,
@@ -76,13 +76,13 @@ def file_of(diagnosed: Diagnosed, recording: Recording) -> DiagnosisFile:
             software=SOFTWARE,
             rig=rig,
             samples=len(recording.samples),
-            blunders=blunders,
+            blunders=gross_errors,
             incomplete=tuple(map(_incomplete, diagnosed.incomplete)),
         )
-    return _with_physics(diagnosed.physics, rig, blunders)
+    return _with_physics(diagnosed.physics, rig, gross_errors)
 
 
-def _with_physics(physics: Physics, rig: RigRecord, blunders: tuple[GrossErrorRecord, ...]) -> DiagnosisFile:
+def _with_physics(physics: Physics, rig: RigRecord, gross_errors: tuple[GrossErrorRecord, ...]) -> DiagnosisFile:
     said = physics.diagnosis
     judged = _judged(said)
     floor = next((f for f in said.floors if judged is not None and f.instrument == judged.instrument), None)
@@ -121,7 +121,7 @@ def _with_physics(physics: Physics, rig: RigRecord, blunders: tuple[GrossErrorRe
         confusable=confusable,
         not_recorded=tuple(dict.fromkeys(NotRecorded(m.driver, m.column, m.physics) for m in said.missing)),
         derived=(DERIVED_APPROACH,) if drivers.approach_derived else (),
-        blunders=blunders,
+        blunders=gross_errors,
         incomplete=tuple(map(_incomplete, stages.failed)),
         noise=tuple(map(_noise, said.noise)),
     )
@@ -217,8 +217,8 @@ def _confusable(bench: Bench) -> tuple[tuple[NameRecord, NameRecord, float], ...
     return tuple((_name(a), _name(b), r2) for (a, b), r2 in out.items())
 
 
-def _blunder(blunder: GrossError) -> GrossErrorRecord:
-    return GrossErrorRecord(blunder.kind.value, tuple(row + 1 for row in blunder.rows), blunder.column, blunder.says)
+def _gross_error(error: GrossError) -> GrossErrorRecord:
+    return GrossErrorRecord(error.kind.value, tuple(row + 1 for row in error.rows), error.column, error.says)
 
 
 def _name(name: Named) -> NameRecord:

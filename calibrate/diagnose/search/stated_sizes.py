@@ -11,7 +11,7 @@ from calibrate.diagnose.search.bench import Bench
 from calibrate.diagnose.search.line_search import telling_times
 from calibrate.diagnose.search.noise_law import curvature_of
 from calibrate.model.effects.drivers import Drivers
-from calibrate.model.effects.loads import doubtful_rigs
+from calibrate.model.effects.loads import possible_rigs
 from calibrate.model.effects.term import Accepted, Form, Size, Term
 
 Floats = NDArray[np.float64]
@@ -58,18 +58,18 @@ def sandwich(bench: Bench, columns: Floats) -> Floats:
     each = np.zeros((int(group.max()) + 1, columns.shape[1]))
     np.add.at(each, group, met[data])
     w, V = np.linalg.eigh(unit.T @ unit * curvature_of(rows))
-    told = w > limits.DETERMINED * max(float(w.max(initial=0.0)), 1e-300)
-    inverse = (V[:, told] / w[told]) @ V[:, told].T
+    determined = w > limits.DETERMINED * max(float(w.max(initial=0.0)), 1e-300)
+    inverse = (V[:, determined] / w[determined]) @ V[:, determined].T
     found = inverse @ (each.T @ each + unit[~data].T @ unit[~data]) @ inverse
     covariance = np.asarray(found / np.outer(size, size), dtype=np.float64)
-    untold = np.any(np.abs(V[:, ~told]) > limits.PART_OF_UNDETERMINED, axis=1)
-    covariance[untold, untold] = np.inf
+    undetermined = np.any(np.abs(V[:, ~determined]) > limits.PART_OF_UNDETERMINED, axis=1)
+    covariance[undetermined, undetermined] = np.inf
     return covariance
 
 
 def _by_masses(bench: Bench, a: Accepted, span: Floats, alone: Floats) -> Floats:
     """(m, m) covariance that comes of masses: each, off by a sigma, would have moved the values by so much."""
-    rigs = doubtful_rigs(bench.state.drivers) if a.term.depends_on[0].startswith(WEIGHT) else ()
+    rigs = possible_rigs(bench.state.drivers) if a.term.depends_on[0].startswith(WEIGHT) else ()
     if not rigs:
         return np.zeros((alone.shape[1], alone.shape[1]))
 

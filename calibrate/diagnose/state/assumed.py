@@ -76,11 +76,11 @@ class Stated(Term):
     columns: Floats = field(kw_only=True)  # (row, width, value)
     added: Floats = field(kw_only=True)  # (row, width) at the values `about`
     about: Floats = field(kw_only=True)  # (value,)
-    elsewhere: Callable[[Samples], tuple[Floats, Floats]] = field(kw_only=True)  # `columns` and `added` of other rows
+    at_samples: Callable[[Samples], tuple[Floats, Floats]] = field(kw_only=True)  # `columns` and `added` of other rows
 
     def at(self, samples: Samples) -> "Stated":
         """The same at other rows. DataError where the effect cannot be evaluated there."""
-        columns, added = self.elsewhere(samples)
+        columns, added = self.at_samples(samples)
         return replace(self, columns=columns, added=added)
 
     def basis(self, drivers: Drivers, inner: Floats) -> Floats:

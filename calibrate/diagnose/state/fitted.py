@@ -144,22 +144,25 @@ class Fitted:
     def _rows(self) -> WhitenedRows:
         parameters = self.problem.parameters
         free = np.flatnonzero([p.free for p in parameters])
-        believed = free[np.isfinite(priors(parameters)[free])]
+        with_prior = free[np.isfinite(priors(parameters)[free])]
         scale, sigma = plausible_sizes(parameters), priors(parameters)
         blocks = sum(block.rows for block in self.session.weighting.known)
         assumed = 0 if self.problem.assumed is None else len(self.problem.assumed.root)
         known = blocks + assumed
         residual = np.concatenate(
-            [-self.problem.residual(self.values), -(self.values - start_values(parameters))[believed] / sigma[believed]]
+            [
+                -self.problem.residual(self.values),
+                -(self.values - start_values(parameters))[with_prior] / sigma[with_prior],
+            ]
         )
-        beliefs = np.zeros((len(believed), len(free)))
-        beliefs[range(len(believed)), np.searchsorted(free, believed)] = scale[believed] / sigma[believed]
+        prior_rows = np.zeros((len(with_prior), len(free)))
+        prior_rows[range(len(with_prior)), np.searchsorted(free, with_prior)] = scale[with_prior] / sigma[with_prior]
         slope = self.problem.forgetting().jacobian(self.values)[:, free] * scale[free]
-        none = np.full(known + len(believed), -1, dtype=np.intp)
+        none = np.full(known + len(with_prior), -1, dtype=np.intp)
         labels = [np.concatenate([x, none]) for x in self._labels]
         stated = len(self._labels[0]) + blocks + np.arange(assumed)
         return WhitenedRows(
-            residual, np.concatenate([slope, beliefs]), *labels, owner=self.problem.owner[free], stated=stated
+            residual, np.concatenate([slope, prior_rows]), *labels, owner=self.problem.owner[free], stated=stated
         )
 
     @cached_property
@@ -183,8 +186,8 @@ class Fitted:
     def _minus_two_log_likelihood(self) -> float:
         parameters = self.problem.parameters[: len(self.session.parameters)]
         sigma = priors(parameters)
-        believed = np.isfinite(sigma) & np.array([p.free for p in parameters])
-        away = (self.geometry - start_values(parameters))[believed] / sigma[believed]
+        with_prior = np.isfinite(sigma) & np.array([p.free for p in parameters])
+        away = (self.geometry - start_values(parameters))[with_prior] / sigma[with_prior]
         known = self.problem.residual(self.values)[len(self._labels[0]) :]
         return sum(s.minus_two_log_likelihood for s in self.scatters) + float(away @ away + known @ known)
 
@@ -246,9 +249,9 @@ class Fitted:
         return (*every, *changes(self.drivers))
 
     def refitted(self, accepted: Sequence[Accepted]) -> "Fitted":
-        kept, swallowed = {a.term.key for a in self.accepted}, self.distrusted >= FEWEST_AFTER
+        kept, many_distrusted = {a.term.key for a in self.accepted}, self.distrusted >= FEWEST_AFTER
         fits = [self._refitted(tuple(accepted), self.noise)]
-        if swallowed and any(a.term.key not in kept and _makes_outliers(a.term) for a in accepted):
+        if many_distrusted and any(a.term.key not in kept and _makes_outliers(a.term) for a in accepted):
             fits.append(self._refitted(tuple(accepted), self.noise.trusted))
         return replace(min(fits, key=lambda fit: fit.minus_two_log_likelihood), before=self.listed)
 

@@ -115,7 +115,7 @@ class _Along:
     problem: EffectProblem
     directions: Directions
     start: Floats  # (value,)
-    believed: Ints
+    with_prior: Ints
     centre: Floats
     sigma: Floats
 
@@ -139,13 +139,13 @@ class _Along:
     def residual(self, theta: Floats) -> Floats:
         """(row + prior,)"""
         values = self.values(theta)
-        away = (values[self.believed] - self.centre) / self.sigma
+        away = (values[self.with_prior] - self.centre) / self.sigma
         return np.concatenate([self.problem.residual(values), away])
 
     def jacobian(self, theta: Floats) -> Floats:
         """(row + prior, move)"""
         data = self.problem.jacobian(self.values(theta)) @ self.directions.moves
-        return np.concatenate([data, self.directions.moves[self.believed] / self.sigma[:, None]])
+        return np.concatenate([data, self.directions.moves[self.with_prior] / self.sigma[:, None]])
 
 
 def _bounds(parameter: Parameter) -> tuple[float, float]:
@@ -166,14 +166,14 @@ def solve_in_sight(
     parameters = problem.parameters
     free = np.flatnonzero([p.free for p in parameters])
     sigma, centre = priors(parameters), start_values(parameters)
-    believed = free[np.isfinite(sigma[free])]
-    along = _Along(problem, directions, start, believed, centre[believed], sigma[believed])
+    with_prior = free[np.isfinite(sigma[free])]
+    along = _Along(problem, directions, start, with_prior, centre[with_prior], sigma[with_prior])
     found = solve(along, damping=damping, max_steps=max_steps, tolerance=tolerance, loss=loss, covariance=False)
     theta = along.values(found.theta)
     return Fit(
         theta,
         parameters,
-        _covariance(problem, theta, free, believed, sigma),
+        _covariance(problem, theta, free, with_prior, sigma),
         found.status,
         found.chi2,
         found.dof - len(free) + len(directions.own),
@@ -182,13 +182,13 @@ def solve_in_sight(
     )
 
 
-def _covariance(problem: EffectProblem, theta: Floats, free: Ints, believed: Ints, sigma: Floats) -> Floats:
+def _covariance(problem: EffectProblem, theta: Floats, free: Ints, with_prior: Ints, sigma: Floats) -> Floats:
     """(value, value) of all free values, along what is not seen by what is assumed; nan where it does not exist."""
     n, unit = len(theta), plausible_sizes(problem.parameters)[free]
-    beliefs = np.zeros((len(believed), len(free)))
-    beliefs[range(len(believed)), np.searchsorted(free, believed)] = unit[np.searchsorted(free, believed)]
-    beliefs /= sigma[believed][:, None]
-    scaled = covariance_of(np.concatenate([problem.jacobian(theta)[:, free] * unit, beliefs]))
+    prior_rows = np.zeros((len(with_prior), len(free)))
+    prior_rows[range(len(with_prior)), np.searchsorted(free, with_prior)] = unit[np.searchsorted(free, with_prior)]
+    prior_rows /= sigma[with_prior][:, None]
+    scaled = covariance_of(np.concatenate([problem.jacobian(theta)[:, free] * unit, prior_rows]))
     if scaled is None:
         return np.full((n, n), np.nan)
     out = np.zeros((n, n))

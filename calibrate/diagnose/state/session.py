@@ -63,40 +63,40 @@ class Session:
     @cached_property
     def parameters(self) -> tuple[Parameter, ...]:
         """Geometry, every free one with a prior."""
-        each = (replace(p, prior=np.inf) if p.name in self.stated else _believed(p) for p in self.weighting.parameters)
+        each = (replace(p, prior=np.inf) if p.name in self.stated else _assumed(p) for p in self.weighting.parameters)
         return tuple(each)
 
 
 def session_of(rig: Rig, samples: Samples) -> Session:
     """The session of a table of samples without gross errors. DataError where it holds no observation."""
-    belief = _belief(rig, samples)
-    arm = arm_of(rig, belief)
-    found = instruments_of(samples, _doubted(rig, belief), arm=arm, asked=names_with(Trait.BETWEEN_ENCODERS))
+    link_prior = _link_prior(rig, samples)
+    arm = arm_of(rig, link_prior)
+    found = instruments_of(samples, _with_priors(rig, link_prior), arm=arm, asked=names_with(Trait.BETWEEN_ENCODERS))
     return Session(rig, samples, arm, found.weighting, found.start)
 
 
-def _belief(rig: Rig, samples: Samples) -> LinkTolerance | None:
+def _link_prior(rig: Rig, samples: Samples) -> LinkTolerance | None:
     if rig.tolerance is not None:
         return None
     held = [k for k in SENSORS if Trait.TARGET in k.traits and k.columns[0] in samples]
     return SCALELESS if held and all(Trait.SCALELESS in k.traits for k in held) else WIDE
 
 
-def _doubted(rig: Rig, belief: LinkTolerance | None) -> Rig:
+def _with_priors(rig: Rig, link_prior: LinkTolerance | None) -> Rig:
     """The rig with a prior about the detectors' bracket, where none is stated.
 
     Gains are held unless the rig leaves them open: they are then a cause to be named.
     """
     stated = rig.tolerance
     if stated is None:
-        links = WIDE if belief is None else belief
+        links = WIDE if link_prior is None else link_prior
         stated = Tolerance(length_m=links.length_sigma_m, angle_rad=links.angle_sigma_rad)
     if stated.psd2_m is None or stated.psd2_rad is None:
         stated = msgspec.structs.replace(stated, psd2_m=PAIR.length_sigma_m, psd2_rad=PAIR.angle_sigma_rad)
     return msgspec.structs.replace(rig, tolerance=stated)
 
 
-def _believed(p: Parameter) -> Parameter:
+def _assumed(p: Parameter) -> Parameter:
     return p if not p.free or np.isfinite(p.prior) else replace(p, prior=limits.GAUGE * p.plausible)
 
 

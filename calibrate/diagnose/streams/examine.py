@@ -108,8 +108,8 @@ def _mended(devices: Mapping[str, StreamDevice]) -> tuple[list[StreamFinding], d
     for name, device in devices.items():
         moving = devices["command"].track if name == "joints" and "command" in devices else None
         faults = breaks(device.track, device.sequence, moving, noisy=name == "spots")
-        told, out[name] = judged(device, faults)
-        found += break_findings(device.track, told)
+        track_faults, out[name] = judged(device, faults)
+        found += break_findings(device.track, track_faults)
     return found, out
 
 

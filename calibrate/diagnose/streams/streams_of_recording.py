@@ -60,11 +60,11 @@ class AroundSamples:
 
 def sample_windows(recording: Recording) -> tuple[Window, ...] | None:
     """On the clock of the PSD box, one a sample; None where the recording does not state it."""
-    told = [event.detail for event in recording.events if event.kind == EVENT]
-    if not told or len(told) != len(recording.samples):
+    details = [event.detail for event in recording.events if event.kind == EVENT]
+    if not details or len(details) != len(recording.samples):
         return None
     try:
-        return tuple(Window(float(one["psd_from_s"]), float(one["psd_to_s"])) for one in told)
+        return tuple(Window(float(one["psd_from_s"]), float(one["psd_to_s"])) for one in details)
     except (KeyError, TypeError, ValueError):
         return None
 
@@ -148,16 +148,16 @@ def with_streams(file: DiagnosisFile, report: StreamReport | None) -> DiagnosisF
     """The diagnosis with what its recording's streams show; findings of the samples stay in front."""
     if report is None:
         return file
-    told = [_finding(one) for one in report.findings if not _known(one, file)]
-    faults = tuple(one for one in told if one.physics not in USUAL)
+    new_findings = [_finding(one) for one in report.findings if not _known(one, file)]
+    faults = tuple(one for one in new_findings if one.physics not in USUAL)
     streams = StreamsRecord(
         len(report.stands),
         tuple(_clock(name, fit) for name, fit in report.clocks.items()),
-        tuple(one for one in told if one.physics in USUAL),
+        tuple(one for one in new_findings if one.physics in USUAL),
         report.unseen,
     )
-    parted = faults and file.verdict == Verdict.CONSISTENT.value
-    verdict = Verdict.MISMATCH.value if parted else file.verdict
+    differs = faults and file.verdict == Verdict.CONSISTENT.value
+    verdict = Verdict.MISMATCH.value if differs else file.verdict
     return replace(file, verdict=verdict, findings=file.findings + faults, streams=streams)
 
 

@@ -4,6 +4,15 @@ diagnosis.
 
 from calibrate.diagnose.with_model.from_diagnosis import model_of_diagnosis, model_of_fit
 from calibrate.diagnose.with_model.known import ANEW, Known, known_before
-from calibrate.diagnose.with_model.later_recording import beside_known, only_new, refit
+from calibrate.diagnose.with_model.later_recording import only_new, refit, with_known_model
 
-__all__ = ["ANEW", "Known", "beside_known", "known_before", "model_of_diagnosis", "model_of_fit", "only_new", "refit"]
+__all__ = [
+    "ANEW",
+    "Known",
+    "known_before",
+    "model_of_diagnosis",
+    "model_of_fit",
+    "only_new",
+    "refit",
+    "with_known_model",
+]

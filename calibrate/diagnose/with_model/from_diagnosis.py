@@ -231,10 +231,10 @@ def _covariance(fit: Fitted) -> Floats:
     nearby serve here (1e-5 of them, and metres of such a combination are not known).
     """
     parameters = fit.problem.parameters
-    free, scale, belief = np.flatnonzero([p.free for p in parameters]), plausible_sizes(parameters), priors(parameters)
+    free, scale, prior = np.flatnonzero([p.free for p in parameters]), plausible_sizes(parameters), priors(parameters)
     slope = fit.problem.forgetting().jacobian(fit.values)[:, free] * scale[free]
-    beliefs = np.diag(np.where(np.isfinite(belief[free]), scale[free] / belief[free], 0.0))
-    _, s, Vt = np.linalg.svd(np.concatenate([slope, beliefs]), full_matrices=False)
+    prior_rows = np.diag(np.where(np.isfinite(prior[free]), scale[free] / prior[free], 0.0))
+    _, s, Vt = np.linalg.svd(np.concatenate([slope, prior_rows]), full_matrices=False)
     root = scale[free, None] * Vt.T / s
     out = np.zeros((len(parameters), len(parameters)))
     out[np.ix_(free, free)] = root @ root.T / max(curvature_of(fit.rows), LEAST_CURVED)
@@ -254,8 +254,8 @@ def _records(fit: Fitted, covariance: Floats, seen: Identifiability) -> tuple[Mo
     for i, (p, value) in enumerate(zip(fit.session.parameters, fit.geometry, strict=True)):
         if p.free:
             why, sigma = seen.reason(p.name), float(np.sqrt(covariance[i, i]))
-            told = why is None
-            out.append(ModelParameter(p.name, p.unit, float(value) if told else None, sigma if told else None, why))
+            shown = why is None
+            out.append(ModelParameter(p.name, p.unit, float(value) if shown else None, sigma if shown else None, why))
     return tuple(out)
 
 
@@ -372,8 +372,8 @@ def _curve(a: Accepted, drivers: Drivers, covariance: Floats) -> EffectCurve | N
     knots = np.linspace(float(x.min()), float(x.max()), KNOTS)
     sigma = np.sqrt(np.maximum(np.sum((basis[:, component] @ covariance) * basis[:, component], axis=1), 0.0))
     unit = "rad" if a.term.port.where.endswith(("angle", "tilt", "twist", "direction")) else "m"
-    values, doubt = (np.interp(knots, x[order], v[order]) for v in (amount[:, component], sigma))
-    return EffectCurve(a.term.depends_on[0], unit, *(tuple(v.tolist()) for v in (knots, values, doubt)))
+    values, sigmas = (np.interp(knots, x[order], v[order]) for v in (amount[:, component], sigma))
+    return EffectCurve(a.term.depends_on[0], unit, *(tuple(v.tolist()) for v in (knots, values, sigmas)))
 
 
 def _noise(fit: Fitted, rank: int) -> tuple[Fields, tuple[str, ...]]:

@@ -122,10 +122,10 @@ def _later(model: ModelFile, session: Session) -> Fitted:
     covariance = _part(model.covariance, known)
     scale = np.concatenate([plausible_sizes(session.parameters), np.zeros(len(names) - len(session.parameters))])[at]
     scale = np.where(scale > 0.0, scale, np.sqrt(np.diag(covariance)))
-    told = replace(session, stated=frozenset(known))
+    with_known = replace(session, stated=frozenset(known))
     own = at < len(session.parameters)
     unit = np.where(own, np.minimum(scale, limits.STRAIGHT), limits.LOOSE * np.sqrt(np.diag(covariance)))
-    return fit_from_model(told, geometry, terms, Assumed.of(at, start[at], covariance, scale), start, unit)
+    return fit_from_model(with_known, geometry, terms, Assumed.of(at, start[at], covariance, scale), start, unit)
 
 
 def _values(model: ModelFile, session: Session, geometry: Fitted) -> Floats:
@@ -148,7 +148,7 @@ def _apart(name: str, then: dict[str, tuple[float, ...]], now: dict[str, tuple[f
 def _stated(one: Acting, k: int, found_at: Callable[[Samples], tuple[Acting, ...]]) -> Accepted:
     """Number `k` of those that are found at the rows of any samples."""
 
-    def elsewhere(samples: Samples) -> tuple[Floats, Floats]:
+    def at_samples(samples: Samples) -> tuple[Floats, Floats]:
         there = found_at(samples)[k]
         return there.by_value, there.amount
 
@@ -163,7 +163,7 @@ def _stated(one: Acting, k: int, found_at: Callable[[Samples], tuple[Acting, ...
         columns=one.by_value,
         added=one.amount,
         about=values,
-        elsewhere=elsewhere,
+        at_samples=at_samples,
     )
     return Accepted(stated, values, np.zeros(0))
 

@@ -10,7 +10,7 @@ from msgspec import structs
 from acquisition.recording import Recording
 from calibrate.diagnose.assess.diagnosis import Verdict
 from calibrate.diagnose.from_recording import Diagnosed
-from calibrate.diagnose.gross_errors import blunders_first
+from calibrate.diagnose.gross_errors import gross_errors_first
 from calibrate.diagnose.record.schema import (
     ChangedRecord,
     DiagnosisFile,
@@ -44,15 +44,15 @@ def only_new(found: Diagnosed) -> Diagnosed:
     return replace(found, physics=replace(found.physics, diagnosis=said))
 
 
-def beside_known(file: DiagnosisFile, known: Known, found: Diagnosed) -> DiagnosisFile:
+def with_known_model(file: DiagnosisFile, known: Known, found: Diagnosed) -> DiagnosisFile:
     """The record with `known` and `changed`; `file` is of `found`."""
     entered = known.effects
     left = tuple(e.name for e in known.model.effects if e not in entered and not e.after)
-    told = KnownRecord(known.same_recording, tuple(e.name for e in entered), left)
+    known_record = KnownRecord(known.same_recording, tuple(e.name for e in entered), left)
     findings = () if found.physics is None else found.physics.diagnosis.findings
     each = zip(file.findings, findings, strict=True)
     changed = tuple(c for record, finding in each for c in _changed(record, finding.variant, known))
-    return structs.replace(file, known=told, changed=changed)
+    return structs.replace(file, known=known_record, changed=changed)
 
 
 def _changed(finding: FindingRecord, variant: str, known: Known) -> tuple[ChangedRecord, ...]:
@@ -107,7 +107,7 @@ def refit(known: ModelFile, recording: Recording) -> Refitted:
 
     DataError where the recording is wrong as a whole, or holds nothing to fit.
     """
-    cleared = blunders_first(recording.rig, recording.samples)
+    cleared = gross_errors_first(recording.rig, recording.samples)
     if cleared.whole_file:
         raise DataError("; besides, ".join(b.says for b in cleared.blunders if b.whole_file))
     session = session_of(recording.rig, cleared.samples)

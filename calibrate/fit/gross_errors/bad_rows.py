@@ -119,8 +119,8 @@ def _best_turn(shots: Shots, i: int, j: int) -> tuple[float, float]:
     starts = np.append(GRID_RAD, 0.0)
     turn = float(starts[np.argmin(np.linalg.norm(misfit(starts), axis=1))])
     for _ in range(NEWTON_STEPS):
-        here, beside = misfit(np.array([turn, turn + DIFFERENCE_RAD]))
-        slope = (beside - here) / DIFFERENCE_RAD
+        here, moved = misfit(np.array([turn, turn + DIFFERENCE_RAD]))
+        slope = (moved - here) / DIFFERENCE_RAD
         square = float(slope @ slope)
         if square == 0.0:
             break
@@ -189,10 +189,10 @@ def _copies(original: int, rows: list[int]) -> GrossError:
 AGAIN = "take both again, or remove it too"
 
 
-def left_alone(samples: Samples, blunders: Sequence[GrossError]) -> tuple[GrossError, ...]:
+def left_alone(samples: Samples, gross_errors: Sequence[GrossError]) -> tuple[GrossError, ...]:
     """One gross error for every row that has lost its partner to these gross errors, or to one found here."""
-    copies = {row for b in blunders if b.kind is GrossErrorKind.DUPLICATED_ROWS for row in b.rows}
-    bad = {row for b in blunders for row in b.rows}
+    copies = {row for b in gross_errors if b.kind is GrossErrorKind.DUPLICATED_ROWS for row in b.rows}
+    bad = {row for b in gross_errors for row in b.rows}
     out: list[GrossError] = []
     while found := [*_ends(samples, copies, bad), *_last_in_seat(samples, bad)]:
         bad |= {row for b in found for row in b.rows}

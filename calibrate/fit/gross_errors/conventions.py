@@ -299,8 +299,8 @@ def _mirror_image(best: _Account, tried: list[_Account]) -> str:
     column = next(one.column for one in twin.said if one.kind is GrossErrorKind.MIRRORED_AXIS).removeprefix("columns ")
     moved_mm, instead_mm = 1e3 * best.strain.moved_m, 1e3 * twin.strain.moved_m
     target = f" (target {instead_mm:.2g} mm off its drawing then, {moved_mm:.2g} mm by the signs)"
-    told = "" if _as_good(best, twin) else target
-    return f"; less likely: one of {column} is negated, or two are exchanged{told}"
+    target_text = "" if _as_good(best, twin) else target
+    return f"; less likely: one of {column} is negated, or two are exchanged{target_text}"
 
 
 def _in_words(account: _Account) -> str:

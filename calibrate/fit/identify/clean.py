@@ -114,29 +114,29 @@ def clean(weighting: Weighting, start: Floats) -> tuple[Weighting, tuple[GrossEr
     DataError where so many rows are bad that the rest is no basis.
     """
     rows = np.unique(np.concatenate([m.sample_rows.ravel() for m in weighting.measured]))
-    blunders: list[GrossError] = []
+    gross_errors: list[GrossError] = []
     kept = weighting
     for _ in range(PASSES):
         found = _found(kept, wary_fit(kept, start))
         if not found:
             break
-        blunders += found
-        refuse_most(tuple(blunders), len(rows))
-        kept = weighting.take(np.setdiff1d(rows, rows_of(blunders)))
-    return kept, tuple(blunders)
+        gross_errors += found
+        refuse_most(tuple(gross_errors), len(rows))
+        kept = weighting.take(np.setdiff1d(rows, rows_of(gross_errors)))
+    return kept, tuple(gross_errors)
 
 
-def rows_of(blunders: Sequence[GrossError]) -> NDArray[np.intp]:
+def rows_of(gross_errors: Sequence[GrossError]) -> NDArray[np.intp]:
     """Every row that any of them names, sorted."""
-    return np.array(sorted({row for b in blunders for row in b.rows}), dtype=np.intp)
+    return np.array(sorted({row for b in gross_errors for row in b.rows}), dtype=np.intp)
 
 
-def refuse_most(blunders: tuple[GrossError, ...], rows: int) -> None:
+def refuse_most(gross_errors: tuple[GrossError, ...], rows: int) -> None:
     """DataError where so many of the rows are named that it is open which ones are the good ones."""
-    bad = len(rows_of(blunders))
+    bad = len(rows_of(gross_errors))
     if bad > MOST_BAD * rows:
         raise DataError(
-            f"{bad} of {rows} rows do not go with the rest (first: {blunders[0].says}); "
+            f"{bad} of {rows} rows do not go with the rest (first: {gross_errors[0].says}); "
             "check that joints and observations are of the same rows and session"
         )
 
@@ -162,14 +162,14 @@ def _found(weighting: Weighting, theta: Floats) -> list[GrossError]:
     return out
 
 
-def _beyond_the_arm(blunder: GrossError, shots: Shots) -> bool:
+def _beyond_the_arm(gross_error: GrossError, shots: Shots) -> bool:
     """Whether a row is wrong whatever the arm does: where all rows miss by several times the noise, physics is missing
     from the model, and rows that feel most of it are as good as any.
     """
     misfit = shots.misfit()
     distance = np.linalg.norm(misfit, axis=1)
     scale = robust_scale(distance, misfit.shape[1], shots.met)
-    mine = distance[np.isin(shots.rows, blunder.rows)]
+    mine = distance[np.isin(shots.rows, gross_error.rows)]
     return scale <= SEVERAL or float(np.median(mine)) > UNMISTAKABLE * scale
 
 

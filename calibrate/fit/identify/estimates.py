@@ -12,7 +12,7 @@ from calibrate.model.parameters import Parameter
 
 Floats = NDArray[np.float64]
 
-ONLY_BELIEVED = "known from its assumed tolerance only"
+ONLY_ASSUMED = "known from its assumed tolerance only"
 UNSTATED = "assumed for want of a [tolerance]"
 HELD = "held so that a combination has an answer; see the combinations"
 
@@ -44,10 +44,10 @@ def assumed_size(p: Parameter) -> str:
     return f"± {1e3 * p.prior:.3g} m{p.unit}" if p.unit in ("m", "rad") else f"± {p.prior:.3g} {p.unit}"
 
 
-def untold(p: Parameter, seen: Identifiability) -> str | None:
+def undetermined_why(p: Parameter, seen: Identifiability) -> str | None:
     """Why the rank forbids a number for a parameter, None if it does not."""
     why = seen.reason(p.name)
-    return why if why is None or not p.assumed else f"{ONLY_BELIEVED}: {assumed_size(p)}, {UNSTATED}; {why}"
+    return why if why is None or not p.assumed else f"{ONLY_ASSUMED}: {assumed_size(p)}, {UNSTATED}; {why}"
 
 
 def estimate_of(p: Parameter, value: float, sigma: float, fit: Fit, unseen: str | None) -> Estimate:

@@ -24,11 +24,11 @@ from calibrate.fit.accuracy import (
 )
 from calibrate.fit.identify.estimates import (
     HELD,
-    ONLY_BELIEVED,
+    ONLY_ASSUMED,
     Estimate,
     assumed_size,
     estimate_of,
-    untold,
+    undetermined_why,
 )
 from calibrate.fit.identify.evidence import EvidenceOptions, evidence_of, lengths, rows_used
 from calibrate.fit.identify.result import (
@@ -62,14 +62,14 @@ Ints = NDArray[np.int64]
 LEAST_DOF = 3.0  # a Satterthwaite number below this is itself a guess
 ONLY_PRIOR = 2.0 / np.sqrt(5.0)  # of a prior sigma: the data alone know it to twice that, see identifiability.WEAK
 
-TOLD = 0.05  # of the plausible size: a member of an unseen combination that can move no further is a number
+PULLED_SHARE = 0.05  # of the plausible size: a member of an unseen combination that can move no further is a number
 SEEN = 2.0  # sigma: joint repeatability that second encoders have taken out, as against none
 FAR = 3.0  # plausible sizes that the truth of an unseen combination may lie from where it was held
 
 
 def result_of(
     fitted: SettledFit,
-    blunders: tuple[GrossError, ...],
+    gross_errors: tuple[GrossError, ...],
     rig: Rig,
     samples: Samples,
     *,
@@ -87,7 +87,7 @@ def result_of(
     noise, stated = sizes_of_noise(fitted.weighting, fitted.factors), _as_stated(fitted)
     return Identification(
         status,
-        blunders,
+        gross_errors,
         _estimates(fitted, seen),
         seen,
         tuple(_found(fitted, i, before.theta) for i in range(len(fitted.weighting.measured))),
@@ -135,26 +135,26 @@ def _estimates(fitted: SettledFit, seen: Identifiability) -> tuple[Estimate, ...
     if fit.status is not Status.NOT_FINITE:
         pulled = pull_along(fitted.problem, fit.theta, without_assumed(fitted.problem.parameters), seen)
     free = np.array([p.free for p in fit.parameters])
-    told = free & (pulled < TOLD * plausible_sizes(fit.parameters))
+    narrow = free & (pulled < PULLED_SHARE * plausible_sizes(fit.parameters))
     total = np.hypot(sigma, pulled)
     return tuple(
-        estimate_of(p, float(fit.theta[i]), float(total[i]), fit, _why_untold(p, fit, i, seen, told=bool(told[i])))
+        estimate_of(p, float(fit.theta[i]), float(total[i]), fit, _why_not(p, fit, i, seen, narrow=bool(narrow[i])))
         for i, p in enumerate(fitted.problem.parameters)
     )
 
 
-def _why_untold(p: Parameter, fit: Fit, i: int, seen: Identifiability, *, told: bool) -> str | None:
-    if not told:
-        return untold(p, seen) or HELD
+def _why_not(p: Parameter, fit: Fit, i: int, seen: Identifiability, *, narrow: bool) -> str | None:
+    if not narrow:
+        return undetermined_why(p, seen) or HELD
     if np.isfinite(p.prior) and np.sqrt(fit.covariance[i, i]) > ONLY_PRIOR * p.prior:
-        return f"{ONLY_BELIEVED}: {assumed_size(p)}; these data do not determine it better"
+        return f"{ONLY_ASSUMED}: {assumed_size(p)}; these data do not determine it better"
     return None
 
 
 def _widening(fitted: SettledFit) -> Floats:
     """(param,) factor on sigma that keeps the odds of 3 sigma when the noise is known from few data."""
     parameters = fitted.fit.parameters
-    dof = fitted.weighting.doubt(parameters, fitted.fit.theta, fitted.factors)
+    dof = fitted.weighting.dof(parameters, fitted.fit.theta, fitted.factors)
     out = np.ones(len(parameters))
     out[[p.free for p in parameters]] = stdtrit(np.maximum(dof, LEAST_DOF), ndtr(3.0)) / 3.0
     return out

@@ -17,7 +17,7 @@ from acquisition.recording.files.bounds import ARM_M
 from acquisition.recording.rig import ArmModel, Rig
 from acquisition.recording.samples import POSITION
 from calibrate.errors import DataError
-from calibrate.fit.fit_plan import DEFAULT, BesideName, FitPlan
+from calibrate.fit.fit_plan import DEFAULT, FitPlan, MethodName
 from calibrate.fit.gross_errors.bad_rows import duplicated_rows, left_alone, rows_beyond_limits
 from calibrate.fit.gross_errors.conventions import wrong_convention, wrong_table
 from calibrate.fit.gross_errors.joint_hypotheses import as_radians, beyond_limits
@@ -60,20 +60,20 @@ def identify(
     where the whole file is wrong, or where the plan asks for what rig or samples do not have.
     """
     rig, samples = rig_as_planned(rig, plan), samples_as_planned(samples, plan)
-    weighting, start, blunders = without_blunders(rig, samples, plan)
+    weighting, start, gross_errors = without_gross_errors(rig, samples, plan)
     by = Estimator(plan.algorithm, plan.robust_loss, plan.rules)
     fitted = settled_fit(weighting, coarse_start(weighting, start), plan.of_redundant, by)
     share = plan.share if held_out_share is None else held_out_share
     rounds = plan.bootstrap if bootstrap_rounds is None else bootstrap_rounds
     asked = EvidenceOptions(Splitting(share, plan.splits), rounds)
-    result = result_of(fitted, blunders, rig, samples, asked=asked, rng=rng)
-    if plan.method is not BesideName.POINT_CONSTRAINT:
+    result = result_of(fitted, gross_errors, rig, samples, asked=asked, rng=rng)
+    if plan.method is not MethodName.POINT_CONSTRAINT:
         return result
-    kept = np.setdiff1d(np.arange(len(samples)), rows_of(blunders))
+    kept = np.setdiff1d(np.arange(len(samples)), rows_of(gross_errors))
     return replace(result, point_constraints=point_constraints(rig, samples.take(kept)))
 
 
-def without_blunders(
+def without_gross_errors(
     rig: Rig, samples: Samples, plan: FitPlan = DEFAULT
 ) -> tuple[Weighting, Floats, tuple[GrossError, ...]]:
     """What can be averaged, a start for it, and what was wrong with the rows left out. DataError as of `identify`."""
@@ -90,8 +90,8 @@ def without_blunders(
 
 def refuse_wrong_file(rig: Rig, samples: Samples) -> None:
     """DataError that names which conventions the file is written by, where they are not those of the rig."""
-    if blunders := wrong_file(rig, samples):
-        raise DataError("; besides, ".join(blunder.says for blunder in blunders))
+    if gross_errors := wrong_file(rig, samples):
+        raise DataError("; besides, ".join(gross_error.says for gross_error in gross_errors))
 
 
 def _refuse_positions(instruments: Instruments) -> None:
@@ -123,7 +123,7 @@ def wrong_file(rig: Rig, samples: Samples) -> tuple[GrossError, ...]:
     found = _wrong_table(rig, witnesses) or wrong_convention(_drawn_flange(rig), witnesses)
     if in_degrees is None and found is None:
         found = mirrored_axes(rig, samples)
-    return tuple(blunder for blunder in (in_degrees, found) if blunder is not None)
+    return tuple(gross_error for gross_error in (in_degrees, found) if gross_error is not None)
 
 
 def _wrong_table(rig: Rig, witnesses: Sequence[Witness]) -> GrossError | None:
@@ -139,8 +139,8 @@ def impossible_rows(rig: Rig, samples: Samples) -> tuple[GrossError, ...]:
     return _with_left_alone(samples, duplicated_rows(samples) + rows_beyond_limits(samples, _limits_rad(rig)))
 
 
-def _with_left_alone(samples: Samples, blunders: tuple[GrossError, ...]) -> tuple[GrossError, ...]:
-    return blunders + left_alone(samples, blunders)
+def _with_left_alone(samples: Samples, gross_errors: tuple[GrossError, ...]) -> tuple[GrossError, ...]:
+    return gross_errors + left_alone(samples, gross_errors)
 
 
 def _limits_rad(rig: Rig) -> Floats:
@@ -153,19 +153,21 @@ def _sessions_apart(rig: Rig, samples: Samples) -> tuple[GrossError, ...]:
     rows, positions = _positions(samples)
     flange = _drawn_flange(rig)(samples.joints()[rows])
     return tuple(
-        blunder
+        gross_error
         for theirs, point in by_target(rig, samples, rows)
         for own in [np.searchsorted(rows, theirs)]
-        for blunder in sessions_apart(flange[own], positions[own], point, theirs)
+        for gross_error in sessions_apart(flange[own], positions[own], point, theirs)
     )
 
 
-def _instruments_without(rig: Rig, samples: Samples, blunders: tuple[GrossError, ...], plan: FitPlan) -> Instruments:
+def _instruments_without(
+    rig: Rig, samples: Samples, gross_errors: tuple[GrossError, ...], plan: FitPlan
+) -> Instruments:
     """The instruments without the rows of these gross errors; their rows count in the samples as given."""
-    if not blunders:
+    if not gross_errors:
         return instruments_for_fit(rig, samples, plan)
-    refuse_most(blunders, len(samples))
-    kept = np.setdiff1d(np.arange(len(samples)), rows_of(blunders))
+    refuse_most(gross_errors, len(samples))
+    kept = np.setdiff1d(np.arange(len(samples)), rows_of(gross_errors))
     found = instruments_for_fit(rig, samples.take(kept), plan)
     return replace(found, weighting=standing_at(found.weighting, kept))
 

@@ -53,7 +53,7 @@ class Constraint(Enum):
 
 
 @dataclass(frozen=True)
-class DrawingDoubt:
+class DrawingTolerance:
     """One sigma of what the point constraint takes from the drawing, and of one centred line."""
 
     line_m: float  # a centred line at the fixture: detector, centring and joint repeatability together
@@ -175,12 +175,12 @@ def point_constraints(rig: Rig, samples: Samples) -> PointConstraints:
             f"{CENTRED_M} m, at one placement; centre such poses, or leave the method out"
         )
     poses, placement, four, every = max(found, key=lambda each: each[:2])
-    arm, mount, doubt = arm_of(rig, links_of(rig)), laser_of(rig), drawing_doubt(rig)
+    arm, mount, tolerances = arm_of(rig, links_of(rig)), laser_of(rig), drawing_tolerance(rig)
     return PointConstraints(
         -placement,
         poses,
-        identify_by_four_poses(arm, mount, data.select(four), doubt),
-        identify_by_point(arm, mount, data.select(every), doubt),
+        identify_by_four_poses(arm, mount, data.select(four), tolerances),
+        identify_by_point(arm, mount, data.select(every), tolerances),
     )
 
 
@@ -203,46 +203,46 @@ def _most_different(data: Observations, rows: Indices) -> tuple[int, int] | None
     return int(rows[i]), int(rows[j])
 
 
-def drawing_doubt(rig: Rig, line_m: float = 5e-6) -> DrawingDoubt:
+def drawing_tolerance(rig: Rig, line_m: float = 5e-6) -> DrawingTolerance:
     """What the point constraint takes from the drawing; 5 µm is how well the servo centres."""
     links = links_of(rig)
-    return DrawingDoubt(line_m, links.length_sigma_m, links.angle_sigma_rad)
+    return DrawingTolerance(line_m, links.length_sigma_m, links.angle_sigma_rad)
 
 
 def identify_by_four_poses(
-    model: KinematicModel, mount: LaserMount, data: Observations, doubt: DrawingDoubt
+    model: KinematicModel, mount: LaserMount, data: Observations, tolerances: DrawingTolerance
 ) -> PointConstraintResult:
     """The paper's procedure on two and two centred poses at one placement. DataError where the poses are not such."""
     _refuse_unfit(data)
     if len(data) != 4:
         raise DataError(f"four-pose point constraint: {len(data)} poses given; choose two of each order")
-    return _identify(model, mount, data, doubt, Constraint.PAIR_POINTS)
+    return _identify(model, mount, data, tolerances, Constraint.PAIR_POINTS)
 
 
 def identify_by_point(
-    model: KinematicModel, mount: LaserMount, data: Observations, doubt: DrawingDoubt
+    model: KinematicModel, mount: LaserMount, data: Observations, tolerances: DrawingTolerance
 ) -> PointConstraintResult:
     """Zeros from four or more centred poses of both orders at one placement. DataError where the poses are not such."""
     _refuse_unfit(data)
-    return _identify(model, mount, data, doubt, Constraint.NEAREST_POINT)
+    return _identify(model, mount, data, tolerances, Constraint.NEAREST_POINT)
 
 
 def _identify(
-    model: KinematicModel, mount: LaserMount, data: Observations, doubt: DrawingDoubt, form: Constraint
+    model: KinematicModel, mount: LaserMount, data: Observations, tolerances: DrawingTolerance, form: Constraint
 ) -> PointConstraintResult:
     parameters = tuple(_bounded(p) for p in model.parameters + mount.parameters)
-    problem = PointConstraint(model, mount, data.q_rad, data.first_psd, doubt.line_m, form, parameters)
+    problem = PointConstraint(model, mount, data.q_rad, data.first_psd, tolerances.line_m, form, parameters)
     nominal = start_values(parameters)
     seen, reduced, fit = _solve_seen(problem, nominal)
-    sigma = _sigma(reduced, fit, doubt)
+    sigma = _sigma(reduced, fit, tolerances)
     columns = [i for i, p in enumerate(model.parameters) if p.name.endswith(".zero")]
     return PointConstraintResult(
         Status.RANK_DEFICIENT if fit.status is Status.CONVERGED and seen.combinations else fit.status,
         tuple(_zero(i + 1, column, fit, sigma, seen) for i, column in enumerate(columns)),
         seen,
         nearest_point(problem.lines(fit.theta))[0],
-        doubt.line_m * float(np.sqrt(np.mean(problem.residual(nominal) ** 2))),
-        doubt.line_m * float(np.sqrt(np.mean(problem.residual(fit.theta) ** 2))),
+        tolerances.line_m * float(np.sqrt(np.mean(problem.residual(nominal) ** 2))),
+        tolerances.line_m * float(np.sqrt(np.mean(problem.residual(fit.theta) ** 2))),
         fit.steps,
     )
 
@@ -284,7 +284,7 @@ def _bounded(p: Parameter) -> Parameter:
     return Parameter(p.name, p.unit, p.plausible, lower=-BOUND_RAD, upper=BOUND_RAD)
 
 
-def _sigma(problem: PointConstraint, fit: Fit, doubt: DrawingDoubt) -> Floats:
+def _sigma(problem: PointConstraint, fit: Fit, tolerances: DrawingTolerance) -> Floats:
     """(param,) sigma of the free zeros: noise of the lines, plus what link and laser tolerances push into them.
 
     Source: consider covariance, Bierman, Factorization Methods for Discrete Sequential Estimation, 1977, ch. VIII.
@@ -293,7 +293,7 @@ def _sigma(problem: PointConstraint, fit: Fit, doubt: DrawingDoubt) -> Floats:
     J = problem.jacobian(fit.theta)
     gain = np.linalg.pinv(J[:, free])
     taken = np.array([not (p.free or p.name.endswith(".zero")) for p in problem.parameters])
-    tolerance = np.array([doubt.of(p) for p in problem.parameters])
+    tolerance = np.array([tolerances.of(p) for p in problem.parameters])
     pushed = gain @ (J[:, taken] * tolerance[taken])
     out = np.full(len(problem.parameters), np.inf)
     out[free] = np.sqrt(np.sum(gain**2, axis=1) + np.sum(pushed**2, axis=1))

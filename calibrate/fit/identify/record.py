@@ -179,7 +179,7 @@ def noise_fields(found: Iterable[Noise], stated: StatedNoise, *, settled: bool) 
     """Flat: `<source>_believed`, `<source>`, `<source>_sigma`, `<source>_at_zero`, and chi-square as stated."""
     out: Fields = {}
     for noise in found:
-        out |= {f"{noise.source}_believed": noise.believed, noise.source: noise.found}
+        out |= {f"{noise.source}_believed": noise.assumed, noise.source: noise.found}
         out |= {f"{noise.source}_sigma": noise.sigma, f"{noise.source}_at_zero": noise.at_zero}
     p = stated.p_above if np.isfinite(stated.p_above) else None
     return (
@@ -208,6 +208,6 @@ def _plain(fields: Fields) -> Fields:
     return {k: getattr(v, "name", v) for k, v in fields.items()}
 
 
-def left_out(blunder: GrossError) -> LeftOut:
+def left_out(error: GrossError) -> LeftOut:
     """With rows counted from 1, as a person counts."""
-    return LeftOut(blunder.kind.name, tuple(row + 1 for row in blunder.rows), blunder.column, blunder.says)
+    return LeftOut(error.kind.name, tuple(row + 1 for row in error.rows), error.column, error.says)

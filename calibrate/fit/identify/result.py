@@ -39,7 +39,7 @@ class Noise:
     """One source of noise: one sigma as assumed, as the residuals show, and how well they show it."""
 
     source: str  # "position", "wire", ...; "joint" is shared by all instruments, rad
-    believed: float
+    assumed: float
     found: float
     sigma: float
     at_zero: bool = False  # too small to be separated from none: `found` is no size, only small

@@ -54,7 +54,7 @@ def settled_fit(
     weighting: Weighting, start: Floats, redundant: Redundant = Redundant.REMOVED, by: Estimator = LEAST_SQUARES
 ) -> SettledFit:
     """Rounds from `start` (param,) until weights and rank stand."""
-    fitted = _round(weighting, weighting.believed, start, FAR_START, redundant, by)
+    fitted = _round(weighting, weighting.assumed_factors, start, FAR_START, redundant, by)
     steps = fitted.fit.steps
     for _ in range(ROUNDS - 1):
         if fitted.fit.status is Status.NOT_FINITE:
@@ -74,7 +74,7 @@ def settled_fit(
 
 def first_fit(weighting: Weighting, start: Floats) -> Floats:
     """(param,) of one round from `start` (param,), the noise as assumed: enough to compare misfits by factors."""
-    return _round(weighting, weighting.believed, start, FAR_START, Redundant.REMOVED).fit.theta
+    return _round(weighting, weighting.assumed_factors, start, FAR_START, Redundant.REMOVED).fit.theta
 
 
 def coarse_start(weighting: Weighting, start: Floats) -> Floats:
@@ -95,7 +95,7 @@ def coarse_start(weighting: Weighting, start: Floats) -> Floats:
 
 def wary_fit(weighting: Weighting, start: Floats) -> Floats:
     """(param,) values that bad rows cannot pull: the least sum of distances, then far rows are let go (Cauchy)."""
-    first = _round(weighting, weighting.believed, start, FAR_START, Redundant.REMOVED)
+    first = _round(weighting, weighting.assumed_factors, start, FAR_START, Redundant.REMOVED)
     problem, theta = first.problem, first.fit.theta
     for turn in range(BLUNT_ROUNDS + WARY_ROUNDS):
         letting_go = turn >= BLUNT_ROUNDS

@@ -284,11 +284,11 @@ def shares_found(
             columns.append((W @ lever.seen(each)[rows]).reshape(-1, seen.shape[1]))
             values.append(np.einsum("nij,nj->ni", W, misfit[rows]).ravel())
     X, y = np.concatenate(columns), np.concatenate(values)
-    told = np.any(X != 0.0, axis=0)
-    out, sigma = np.zeros(len(told)), np.zeros(len(told))
-    if told.any():
+    shown = np.any(X != 0.0, axis=0)
+    out, sigma = np.zeros(len(shown)), np.zeros(len(shown))
+    if shown.any():
         from scipy.optimize import lsq_linear  # only where there are second encoders: identify starts sooner
 
-        out[told] = lsq_linear(X[:, told], y, (0.0, 1.0), method="bvls").x
-        sigma[told] = np.sqrt(np.diag(np.linalg.pinv(X[:, told].T @ X[:, told])))
+        out[shown] = lsq_linear(X[:, shown], y, (0.0, 1.0), method="bvls").x
+        sigma[shown] = np.sqrt(np.diag(np.linalg.pinv(X[:, shown].T @ X[:, shown])))
     return out, sigma

@@ -22,7 +22,7 @@ from calibrate.fit.noise.restricted_likelihood import (
     score_at,
 )
 
-__all__ = ["FIXED", "NoisyRows", "VarianceFactors", "as_assumed", "covariance_of", "doubt", "estimate"]
+__all__ = ["FIXED", "NoisyRows", "VarianceFactors", "as_assumed", "covariance_of", "dof", "estimate"]
 
 Floats = NDArray[np.float64]
 
@@ -83,7 +83,7 @@ def estimate(
     return _found(score_at(turned, log_variance, prior_information, prior_gradient), log_variance, converged=False)
 
 
-def doubt(rows: Sequence[NoisyRows | IndependentRows], prior_information: Floats, factors: VarianceFactors) -> Floats:
+def dof(rows: Sequence[NoisyRows | IndependentRows], prior_information: Floats, factors: VarianceFactors) -> Floats:
     """(param,) Satterthwaite degrees of freedom of each posterior variance, given how well the noise is known."""
     nothing = np.zeros(len(prior_information))
     score = score_at([independent(each) for each in rows], factors.log_variance, prior_information, nothing)

@@ -97,9 +97,9 @@ def analyse(jacobian: Floats, parameters: tuple[Parameter, ...]) -> Identifiabil
     structural = STRUCTURAL * float(s.max(initial=0.0))  # no free parameter at all has no values
     seen = s > max(WEAK, structural)
     unseen = Vt[~seen].T  # (free, k)
-    shift, doubt = np.linalg.norm(unseen, axis=1), np.linalg.norm(Vt[seen].T / s[seen], axis=1)
-    invisible = (shift > TRACE) & (shift > NEGLIGIBLE * doubt)
-    sigma = np.where(invisible, np.inf, scale * doubt)
+    shift, spread = np.linalg.norm(unseen, axis=1), np.linalg.norm(Vt[seen].T / s[seen], axis=1)
+    invisible = (shift > TRACE) & (shift > NEGLIGIBLE * spread)
+    sigma = np.where(invisible, np.inf, scale * spread)
     n_structural = int(np.sum(s < structural))
     return Identifiability(
         names,

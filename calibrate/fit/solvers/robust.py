@@ -177,7 +177,7 @@ def robust_covariance(rows: WeightedRows, theta: Floats, loss: Loss) -> Floats |
     groups = Groups.of(rows.problem, len(z))
     length, k = groups.norms(z), groups.widths
     slope = rows.jacobian(theta)
-    data, beliefs = slope[: len(z)], slope[len(z) :]
+    data, prior_rows = slope[: len(z)], slope[len(z) :]
     weight = loss.weight(length, k)
     bend = groups.spread((loss.curvature(length, k) + (k - 1) * weight) / np.maximum(k, 1))
     level = float(np.mean(bend))
@@ -185,10 +185,10 @@ def robust_covariance(rows: WeightedRows, theta: Floats, loss: Loss) -> Floats |
         return None
     correction = 1.0 + slope.shape[1] / len(z) * float(np.var(bend)) / level**2
     spread = correction**2 * float(np.sum((weight * length) ** 2)) / (len(z) - slope.shape[1])
-    inverse = covariance_of(np.concatenate([np.sqrt(level) * data, beliefs]))
+    inverse = covariance_of(np.concatenate([np.sqrt(level) * data, prior_rows]))
     if inverse is None:
         return None
-    return inverse @ (spread * data.T @ data + beliefs.T @ beliefs) @ inverse
+    return inverse @ (spread * data.T @ data + prior_rows.T @ prior_rows) @ inverse
 
 
 @runtime_checkable

@@ -129,14 +129,14 @@ def postures(q_rad: Floats) -> Floats:
     return np.concatenate([np.cos(q_rad), np.sin(q_rad)], axis=1)
 
 
-def err_alike(misfit: Floats, posture: Floats, among: Rows, elsewhere: Bools | None = None) -> Bools:
+def err_alike(misfit: Floats, posture: Floats, among: Rows, allowed: Bools | None = None) -> Bools:
     """(among,) whether the nearest neighbours in posture err as each of these rows does.
 
-    `misfit` (row, k), `posture` (row, n), rows in the order of capture; `elsewhere` (row,) which may be neighbours, all
+    `misfit` (row, k), `posture` (row, n), rows in the order of capture; `allowed` (row,) which may be neighbours, all
     if None.
     """
     out = np.zeros(len(among), dtype=bool)
-    others = np.arange(len(misfit)) if elsewhere is None else np.flatnonzero(elsewhere)
+    others = np.arange(len(misfit)) if allowed is None else np.flatnonzero(allowed)
     for at, row in enumerate(among.tolist()):
         free = others[np.abs(others - row) > APART]
         if len(free) == 0:

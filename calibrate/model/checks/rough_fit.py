@@ -129,7 +129,7 @@ def rows_of_another_session(shots: Shots) -> tuple[GrossError, ...]:
     k = misfit.shape[1]
     scale, odd = robust_scale(distance, k, shots.met), outlying(distance, k, shots.met)
     found = (_block(shots, first, last, misfit, scale) for first, last in _blocks(odd))
-    return tuple(blunder for blunder in found if blunder is not None)
+    return tuple(gross_error for gross_error in found if gross_error is not None)
 
 
 def sessions_apart(

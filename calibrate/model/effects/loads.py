@@ -87,7 +87,7 @@ def payload(drivers: Drivers, payload_kg: Floats) -> Load:
     return Load(drivers.n_joints, payload_kg, moment)
 
 
-def mass_doubt(drivers: Drivers) -> tuple[float, float]:
+def mass_tolerance(drivers: Drivers) -> tuple[float, float]:
     """One sigma of a stated mass, as a share of it, and of a stated centre (m): as [tolerance] has them, else usual."""
     stated = drivers.rig.tolerance
     share = None if stated is None else stated.mass_share
@@ -96,10 +96,10 @@ def mass_doubt(drivers: Drivers) -> tuple[float, float]:
     return MASS_SHARE if share is None else share, usual_m if off_m is None else off_m
 
 
-def doubts(drivers: Drivers) -> list[Load]:
+def uncertain_loads(drivers: Drivers) -> list[Load]:
     """What one sigma of every stated mass and centre adds; of a tool that is not stated, at the flange."""
     stated = stated_masses(drivers)
-    share, off_m = mass_doubt(drivers)
+    share, off_m = mass_tolerance(drivers)
     out: list[Load] = []
     for mass, i, com in stated:
         out.append(load_at(i, share * mass, com))
@@ -109,9 +109,9 @@ def doubts(drivers: Drivers) -> list[Load]:
     return out
 
 
-def doubtful_rigs(drivers: Drivers) -> tuple[Rig, ...]:
-    """The rig with each stated mass and centre in turn off by one sigma, as `doubts` has it."""
-    rig, (share, off_m) = drivers.rig, mass_doubt(drivers)
+def possible_rigs(drivers: Drivers) -> tuple[Rig, ...]:
+    """The rig with each stated mass and centre in turn off by one sigma, as `uncertain_loads` has it."""
+    rig, (share, off_m) = drivers.rig, mass_tolerance(drivers)
     stated = stated_masses(drivers)
     out: list[Rig] = []
     for i, link in enumerate(rig.arm.joints):

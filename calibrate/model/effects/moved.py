@@ -183,10 +183,10 @@ def _link(drivers: Drivers, i: int) -> Iterator[Form]:
 def _tool(drivers: Drivers) -> Iterator[Form]:
     """The target or probe; of a laser also where it points."""
     port, laser = Port("tool.point", Place.FRAME, drivers.n_joints), spots.KIND.name in drivers.readouts
-    told = ", ".join(f"{{{name}}}" for name in SIX[:3])
+    sizes = ", ".join(f"{{{name}}}" for name in SIX[:3])
     if set(drivers.readouts) - {spots.KIND.name}:
         yield _constant(
-            port, "tool-moved", SIX[:3], np.eye(6)[:, :3], f"The tool moved by {told} in x, y, z of the flange"
+            port, "tool-moved", SIX[:3], np.eye(6)[:, :3], f"The tool moved by {sizes} in x, y, z of the flange"
         )
     if laser:
         yield _laser(drivers)

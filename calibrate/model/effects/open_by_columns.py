@@ -151,7 +151,7 @@ def _open(
     directions: Floats | None,
     variant: str = "",
 ) -> Term:
-    told = ", ".join(f"{{{name}}}" for name in names)
+    sizes = ", ".join(f"{{{name}}}" for name in names)
     return Form(
         port,
         (column.name,),
@@ -162,7 +162,7 @@ def _open(
         function=function,
         names=names,
         limit=limit,
-        sentence=f"{what} with {column.name}, by {told} for its usual swing; why is not known",
+        sentence=f"{what} with {column.name}, by {sizes} for its usual swing; why is not known",
         directions=directions,
     )
 

@@ -274,8 +274,8 @@ class Form(Term):
     def sizes(self, coefficients: Floats, covariance: Floats, inner: Floats, inner_sigma: Floats) -> Mapping[str, Size]:
         sigma = np.sqrt(np.maximum(np.diag(covariance), 0.0))
         out = _polar(self.names, coefficients, covariance) if self.polar else _plain(self.names, coefficients, sigma)
-        for spec, value, doubt in zip(self.inner, inner, inner_sigma, strict=True):
-            out[spec.name] = Size(float(value), float(doubt))
+        for spec, value, own_sigma in zip(self.inner, inner, inner_sigma, strict=True):
+            out[spec.name] = Size(float(value), float(own_sigma))
         return out
 
     def plausible(self, coefficients: Floats, inner: Floats, noise_rad: float) -> bool:

@@ -16,8 +16,8 @@ from calibrate.model.effects.drivers import Drivers
 from calibrate.model.effects.loads import (
     Load,
     carried,
-    doubts,
     payload,
+    uncertain_loads,
     unit_loads,
 )
 from calibrate.model.effects.ports import Port
@@ -83,7 +83,7 @@ def by_corrected(drivers: Drivers, by: By) -> Weighed | None:
     """
     stated = by(drivers, carried(drivers)).sum(axis=2).ravel()
     # kept: a rig with one more mass stated has other uncertainties, but these columns keep their meaning
-    off = doubts(drivers)
+    off = uncertain_loads(drivers)
     each = by(drivers, off)
     each = each.reshape(-1, each.shape[2])
     along = stated @ each / max(float(stated @ stated), 1e-300)

@@ -57,7 +57,7 @@ SOURCES = (
 )
 # Start values where the rig's [noise] states none: a body of 0.1 m at 1.5 m, detected to 0.1 pixel of 0.3 mrad. Across
 # the axis 45 µm / sqrt(markers); along it times range over size of the body. The data correct them.
-BELIEVED = (1e-4, 1e-4, 1e-3, 1e-2, 1e-2, 1e-3)
+ASSUMED_SIGMAS = (1e-4, 1e-4, 1e-3, 1e-2, 1e-2, 1e-3)
 FRAME, BODY = "camera", "marker"  # first parts of the names of parameters
 
 
@@ -77,15 +77,15 @@ class CameraWitness:
 
     def otherwise(self) -> Iterator[Otherwise]:
         """Other conventions of either half."""
-        for told, place in self.place.written_otherwise():
-            yield replace(told, witness=replace(self, place=place))
-        for told, turn in self.turn.written_otherwise():
-            yield replace(told, witness=replace(self, turn=turn))
+        for otherwise, place in self.place.written_otherwise():
+            yield replace(otherwise, witness=replace(self, place=place))
+        for otherwise, turn in self.turn.written_otherwise():
+            yield replace(otherwise, witness=replace(self, turn=turn))
 
 
 def camera_sigmas(rig: Rig) -> tuple[float, ...]:
     """(6,) one sigma along x, y, z (m) and about x, y, z (rad) of the camera, as stated or else as usual."""
-    return (*(rig.noise.camera_m or BELIEVED[:3]), *(rig.noise.camera_rad or BELIEVED[3:]))
+    return (*(rig.noise.camera_m or ASSUMED_SIGMAS[:3]), *(rig.noise.camera_rad or ASSUMED_SIGMAS[3:]))
 
 
 def _build(table: SampleTable) -> Measured | None:

@@ -33,7 +33,7 @@ Ints = NDArray[np.intp]
 
 NAME = "encoder-difference"
 SOURCE = "encoder"  # of noise
-BELIEVED_RAD = 5e-6  # a count of 20 bits a turn is 6 µrad; the data correct it
+ASSUMED_RAD = 5e-6  # a count of 20 bits a turn is 6 µrad; the data correct it
 FOLLOWS_RAD = 0.05  # what no drive and no disc does: the readings are then not of one joint, or not in joint angles
 FEWEST = 10  # rows of a joint, for a zero and a scatter
 LISTED = 5  # rows of a sentence
@@ -185,7 +185,7 @@ def _build(table: SampleTable) -> Measured | None:
         rows = np.flatnonzero((np.abs(observed - sensor.zero_rad) < FOLLOWS_RAD).all(axis=1))
     if len(rows) < FEWEST:
         return None
-    sigma = np.full((len(rows), len(sensor.joints)), BELIEVED_RAD)
+    sigma = np.full((len(rows), len(sensor.joints)), ASSUMED_RAD)
     return table.measured(NAME, SensorChain(table.arm, sensor), rows, observed[rows], {SOURCE: sigma})
 
 

@@ -50,7 +50,7 @@ from calibrate.model.sensors.position import (
 
 Floats = NDArray[np.float64]
 
-ORIENTATION_BELIEVED_RAD = 1e-4  # a 6-D target at a tracker is stated to 0.01 deg
+ORIENTATION_ASSUMED_RAD = 1e-4  # a 6-D target at a tracker is stated to 0.01 deg
 TURN_PLAUSIBLE_RAD = 0.1  # how a target is screwed on, against the drawing
 TURNS = ("roll", "pitch", "yaw")
 
@@ -170,8 +170,8 @@ class OrientationWitness:
 
     def otherwise(self) -> Iterator[Otherwise]:
         """As `written_otherwise`."""
-        for told, _ in self.written_otherwise():
-            yield told
+        for otherwise, _ in self.written_otherwise():
+            yield otherwise
 
     def written_otherwise(self) -> Iterator[tuple[Otherwise, "OrientationWitness"]]:
         """Degrees, and the orientation of the device in the target instead of the other way round."""
@@ -235,7 +235,7 @@ def _build(table: SampleTable) -> Measured | None:
     sensor = FullPose(table.target, table.device(), Rotation.from_rotvec(seen).as_matrix(), mount)
     observed, sigma, turn = np.zeros((len(rows), 6)), np.zeros((len(rows), 6)), np.zeros((len(rows), 6))
     observed[:, :3], sigma[:, :3] = table.position_m[rows], position_sigma_m(table.rig)
-    turn[:, 3:] = ORIENTATION_BELIEVED_RAD
+    turn[:, 3:] = ORIENTATION_ASSUMED_RAD
     own = dict(zip((source.name for source in KIND.noise), (sigma, turn), strict=True))
     return table.measured(KIND.name, SensorChain(table.arm, sensor), rows, observed, own)
 

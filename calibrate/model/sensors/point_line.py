@@ -29,7 +29,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 POINTS = "point"  # parameters are point<k>.x, ...
-LINE_BELIEVED_M = 5e-6  # how well the servo centres a spot
+LINE_ASSUMED_M = 5e-6  # how well the servo centres a spot
 POINT_PLAUSIBLE_M = 0.05  # about the point nearest to the nominal lines
 
 
@@ -50,8 +50,8 @@ class PointLine(Usage):
         return replace(self, points=self.points.select(rows))
 
     def expect(self, phi: Floats, T_base_flange: Floats) -> Floats:
-        beside, travel_m = self._beside(phi, T_base_flange)
-        return beside - phi[:2] - travel_m[:, None] * phi[2:4]
+        off_m, travel_m = self._off_line(phi, T_base_flange)
+        return off_m - phi[:2] - travel_m[:, None] * phi[2:4]
 
     def by_twist(self, phi: Floats, T_base_flange: Floats) -> Floats:
         """The flange moving by a twist is the point moving by its opposite."""
@@ -63,7 +63,7 @@ class PointLine(Usage):
         return out
 
     def by_parameter(self, phi: Floats, T_base_flange: Floats) -> Floats:
-        _, travel_m = self._beside(phi, T_base_flange)
+        _, travel_m = self._off_line(phi, T_base_flange)
         by_mount = np.zeros((len(T_base_flange), 2, 4))
         by_mount[:, range(2), range(2)] = -1.0
         by_mount[:, range(2), range(2, 4)] = -travel_m[:, None]
@@ -75,7 +75,7 @@ class PointLine(Usage):
         m = self.mount
         return np.stack([m.u - phi[2] * m.direction, m.v - phi[3] * m.direction])
 
-    def _beside(self, phi: Floats, T_base_flange: Floats) -> tuple[Floats, Floats]:
+    def _off_line(self, phi: Floats, T_base_flange: Floats) -> tuple[Floats, Floats]:
         """(pose, 2) offsets from, and (pose,) travel along the nominal beam."""
         m = self.mount
         point = self.points.at_poses_m(phi[4:])
@@ -110,7 +110,7 @@ def _build(table: SampleTable) -> Measured | None:
         )
     mount = laser_of(table.rig)
     sensor = PointLine(mount, meeting_points(mount, table.T_base_flange[rows], place))
-    own = {KIND.noise[0].name: np.full((len(rows), 2), LINE_BELIEVED_M)}
+    own = {KIND.noise[0].name: np.full((len(rows), 2), LINE_ASSUMED_M)}
     return table.measured(
         KIND.name, SensorChain(table.arm, sensor), rows, np.zeros((len(rows), 2)), own, condition=True
     )

@@ -47,7 +47,7 @@ from calibrate.model.sensors.kind import (
 
 Floats = NDArray[np.float64]
 
-POSITION_BELIEVED_M = 20e-6  # start value where the rig's [noise] states nothing; the data correct it
+POSITION_ASSUMED_M = 20e-6  # start value where the rig's [noise] states nothing; the data correct it
 NOISE = NoiseSource("position", "m", "position_m")
 
 
@@ -123,8 +123,8 @@ class PositionWitness:
 
     def otherwise(self) -> Iterator[Otherwise]:
         """As `written_otherwise`."""
-        for told, _ in self.written_otherwise():
-            yield told
+        for otherwise, _ in self.written_otherwise():
+            yield otherwise
 
     def written_otherwise(self) -> Iterator[tuple[Otherwise, "PositionWitness"]]:
         """Columns that mirror the readings (one sign, or two of them exchanged; which is open), and millimetres.
@@ -157,7 +157,7 @@ class PositionWitness:
 
 def position_sigma_m(rig: Rig) -> float:
     """One sigma of a coordinate, as stated or else as usual."""
-    return rig.noise.position_m or POSITION_BELIEVED_M
+    return rig.noise.position_m or POSITION_ASSUMED_M
 
 
 def device_of(found: Found) -> Floats:

@@ -44,7 +44,7 @@ Ints = NDArray[np.int64]
 TIP = ("tip_x_m", "tip_y_m", "tip_z_m")
 POINTS = "seat"  # parameters are seat<k>.x, ...
 NOISE = NoiseSource("seat", "m", "seat_m")
-SEAT_BELIEVED_M = 10e-6  # start value where the rig's [noise] states nothing; the data correct it
+SEAT_ASSUMED_M = 10e-6  # start value where the rig's [noise] states nothing; the data correct it
 PLAUSIBLE_M = 0.05  # about the mean of the nominal tips: nominal arms are off by millimetres, hand-made tools by more
 
 
@@ -146,7 +146,7 @@ class SeatWitness:
 
 def seat_sigma_m(rig: Rig) -> float:
     """One sigma of a coordinate of a seated probe, as stated or else as usual."""
-    return rig.noise.seat_m or SEAT_BELIEVED_M
+    return rig.noise.seat_m or SEAT_ASSUMED_M
 
 
 def predicted_tips(found: Found, T_base_flange: Floats, samples: Samples) -> Columns:

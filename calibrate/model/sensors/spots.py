@@ -49,7 +49,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 PLACED = ("placement", "first_psd")  # columns that state how the fixture stood and was struck
-PSD_BELIEVED_M = 2e-6  # a PSD in shop conditions (Deng, Ding, Zhang, Food & Machinery 2019(3))
+PSD_ASSUMED_M = 2e-6  # a PSD in shop conditions (Deng, Ding, Zhang, Food & Machinery 2019(3))
 FEWEST_POSES = 12  # of one placement: four numbers each, six unknowns
 TURNS = 10
 DAMPING = 1e-6  # of the mean square of a column: along lines all alike a fixture stays where it is assumed
@@ -170,7 +170,7 @@ def dual_psd_of(rig: Rig, placement: NDArray[np.int64], first_psd: NDArray[np.in
 
 def psd_sigma_m(rig: Rig) -> float:
     """One sigma of a coordinate of a spot, as stated or else as usual."""
-    return rig.noise.psd_m or PSD_BELIEVED_M
+    return rig.noise.psd_m or PSD_ASSUMED_M
 
 
 def _build(table: SampleTable) -> Measured | None:

@@ -38,7 +38,7 @@ from calibrate.model.sensors.position import device_of
 
 Floats = NDArray[np.float64]
 
-WIRE_BELIEVED_M = 50e-6  # start value where the rig's [noise] states nothing; the data correct it
+WIRE_ASSUMED_M = 50e-6  # start value where the rig's [noise] states nothing; the data correct it
 
 
 @dataclass(frozen=True)
@@ -146,7 +146,7 @@ def _build(table: SampleTable) -> Measured | None:
             f"samples row {rows[bad] + 1}, column '{COLUMN}': {length_m[bad]} m; a length is positive: empty the cell"
         )
     sensor = Wire(table.target, table.device(lambda: trilaterate(table.tips_m[rows], length_m)))
-    own = {KIND.noise[0].name: np.full((len(rows), 1), table.rig.noise.wire_m or WIRE_BELIEVED_M)}
+    own = {KIND.noise[0].name: np.full((len(rows), 1), table.rig.noise.wire_m or WIRE_ASSUMED_M)}
     return table.measured(KIND.name, SensorChain(table.arm, sensor), rows, length_m[:, None], own)
 
 

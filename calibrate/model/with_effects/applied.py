@@ -124,7 +124,7 @@ def joined(recorded: Samples, asked: Samples) -> Samples:
 
 
 def _among(asked: Samples, recorded: Samples) -> dict[str, Floats]:
-    """Columns of the asked rows as rows of the recorded session: its smoothed temperatures at their times, before and
+    """Columns of the asked rows of the recorded session: its smoothed temperatures at their times, before and
     after it what they state; moves from the recorded row before, and of a row that was recorded its own.
     """
     t, own, q_rad = asked.column("t_s"), recorded.column("t_s"), asked.joints()
@@ -178,16 +178,16 @@ class Applied:
 
     by: Perturbation
     found: tuple[Acting, ...]
-    doubts: tuple[tuple[Port, Floats], ...]
+    uncertain: tuple[tuple[Port, Floats], ...]
     outside: tuple[str, ...]
     notes: tuple[str, ...]
 
 
 def effects_at(
-    model: ModelFile, predictor: Predictor, samples: Samples, same_session: bool, *, doubts_too: bool = True
+    model: ModelFile, predictor: Predictor, samples: Samples, same_session: bool, *, with_open: bool = True
 ) -> Applied:
     """`same_session`: the rows are of the recording that the effects were found in, whose clock they share. Elsewhere
-    what slips and bumps have left behind at its end is applied. Without `doubts_too` only what the effects add is found
+    what slips and bumps have left behind at its end is applied. Without `with_open` only what the effects add is found
     and not what is unknown of it.
 
     DataError for rows at which an effect of the model cannot be evaluated.
@@ -207,22 +207,22 @@ def effects_at(
     both = joined(recorded, filled.samples)
     found = acting(carried, predictor, recorded, both)
     by = Perturbation.of_all(len(samples), samples.n_joints, (one.added for one in found))
-    if not doubts_too:
+    if not with_open:
         return Applied(by, found, (), ("",) * len(samples), notes)
-    doubts = [*_of_range(found), *((one.port, one.undated) for one in found if np.any(one.undated))]
+    uncertain = [*_of_range(found), *((one.port, one.undated) for one in found if np.any(one.undated))]
     notes = (*notes, *(_between(one) for one in found if np.any(one.undated)))
     for name, rows in filled.missing.items():
         if name in CENTRE and not same_session:
             continue  # _of_centres, which also knows rows of a session that did not record it
         felt = _of_missing(name, rows, carried, found, predictor, recorded, filled)
-        doubts += [(one.port, off) for one, off in felt]
+        uncertain += [(one.port, off) for one, off in felt]
         notes = (*notes, *_lacks(name, rows, [one.carried.record.name for one, _ in felt]))
     if not same_session:  # the fit has seen what the loads of its own rows do
         for what, name, felt in _of_centres(samples, filled, carried, predictor, recorded):
-            doubts += felt
+            uncertain += felt
             notes = (*notes, f"{what}, sigma widened by {UNSTATED_CENTRE_M:g} m along each axis ({name})")
     outside = _outside(carried, found, predictor, both, len(recorded))
-    return Applied(by, found, tuple(doubts), outside, notes)
+    return Applied(by, found, tuple(uncertain), outside, notes)
 
 
 def recorded_samples(model: ModelFile, n_joints: int) -> Samples:
@@ -337,21 +337,21 @@ def _of_centres(
     rows = carries & (~stated | bool(zero))
     if rows.any():
         off = np.where(rows, UNSTATED_CENTRE_M, 0.0)
-        names, doubts = felt([added(predictor, {**at, name: at[name] + off}) for name in CENTRE])
+        names, uncertain = felt([added(predictor, {**at, name: at[name] + off}) for name in CENTRE])
         where = "at the flange" if zero or not np.any([at[name] for name in CENTRE]) else "where it was in the session"
-        if doubts:
+        if uncertain:
             yield (
                 f"{', '.join(CENTRE)} are missing in {int(rows.sum())} of {int(carries.sum())} rows with a payload "
-                f"(state them, and record them in the session): centre of mass taken {where}", names, doubts,
+                f"(state them, and record them in the session): centre of mass taken {where}", names, uncertain,
             )  # fmt: skip
     tool = predictor.rig.tool
     if tool.mass_kg and tool.com_m is None:
         turned = (tuple((UNSTATED_CENTRE_M * axis).tolist()) for axis in np.eye(3))
         rigs = (structs.replace(predictor.rig, tool=structs.replace(tool, com_m=com)) for com in turned)
-        names, doubts = felt([added(replace(predictor, rig=rig), at) for rig in rigs])
-        if doubts:
+        names, uncertain = felt([added(replace(predictor, rig=rig), at) for rig in rigs])
+        if uncertain:
             says = f"rig {predictor.rig.name}: [tool] com_m is not stated (state it): centre of mass of its"
-            yield f"{says} {tool.mass_kg:g} kg taken at the flange", names, doubts
+            yield f"{says} {tool.mass_kg:g} kg taken at the flange", names, uncertain
 
 
 def _at_the_end(filled: Completed, last_t_s: float) -> Completed:

@@ -36,12 +36,12 @@ def unit_of(name: str, value: float) -> tuple[float, str]:
 ABSENT, WRONG = Statement.ABSENT.value, Statement.WRONG.value
 NOISE = 1.15  # times the floor: some dozen samples held out scatter by so much
 SPLITS = {"random": "samples at random", "place": "each station in turn", "last block": "the end of the session"}
-TOLD = ("encoder-eccentricity", "joint-compliance", "backlash")  # in a sentence; all of them stand in the table
+IN_SENTENCE = ("encoder-eccentricity", "joint-compliance", "backlash")  # in a sentence; all of them stand in the table
 
 
 def verdict_words(file: DiagnosisFile) -> str:
     """What was found, what is left, and what the answer is worth."""
-    if any(not blunder.rows for blunder in file.blunders):
+    if any(not gross_error.rows for gross_error in file.blunders):
         return "The file is wrong as a whole: nothing can be determined about the arm."
     match file.verdict:
         case "mismatch" if file.known is not None:
@@ -120,7 +120,7 @@ def _tested(file: DiagnosisFile) -> str:
 
 def limit_words(file: DiagnosisFile) -> Iterator[str]:
     """Detection limits of the usual causes in one sentence; nothing where none was determined."""
-    shown = [_limit(one) for one in hardest_to_see(file) if one.physics in TOLD]
+    shown = [_limit(one) for one in hardest_to_see(file) if one.physics in IN_SENTENCE]
     if shown:
         yield f"detection limits: {'; '.join(shown)}"
 
@@ -231,6 +231,6 @@ def noise_words(file: DiagnosisFile) -> Iterator[str]:
     """Every stated noise that is wrong, with what supports it and what opposes it."""
     for one in file.noise:
         if one.statement == WRONG:
-            told = [f"for it: {', '.join(one.supports)}"] if one.supports else []
-            told += [f"against it: {', '.join(one.opposes)}"] if one.opposes else []
-            yield "; ".join((one.says, *told))
+            evidence = [f"for it: {', '.join(one.supports)}"] if one.supports else []
+            evidence += [f"against it: {', '.join(one.opposes)}"] if one.opposes else []
+            yield "; ".join((one.says, *evidence))

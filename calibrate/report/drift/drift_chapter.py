@@ -39,7 +39,7 @@ from calibrate.report.evidence.model_tests import proofs
 from calibrate.report.workspace.cells import VIEWS, grid_of
 from calibrate.report.workspace.pictures import Layer, pictures
 
-TOLD = 3  # changes in the sentence; all of them stand in the table
+IN_SENTENCE = 3  # changes in the sentence; all of them stand in the table
 
 
 def sentence(drift: Drift) -> str:
@@ -55,13 +55,13 @@ def sentence(drift: Drift) -> str:
             f"{most if largest.sigmas > 0.0 else ''}{_blind(drift)}."
         )
     clear = found.significant
-    told = [moved(change) for change in clear[:TOLD]]
-    if len(clear) > TOLD:
-        more = len(clear) - TOLD
-        told.append(f"{counted(more, 'more parameter')} changed")
-    if not told and found.together is not None:
-        told = [f"the arm changed, but no single parameter shows where (p = {significant(found.together.p, 2)})"]
-    return f"{since}: {', '.join(told)}{_tool(drift)}."
+    sentences = [moved(change) for change in clear[:IN_SENTENCE]]
+    if len(clear) > IN_SENTENCE:
+        more = len(clear) - IN_SENTENCE
+        sentences.append(f"{counted(more, 'more parameter')} changed")
+    if not sentences and found.together is not None:
+        sentences = [f"the arm changed, but no single parameter shows where (p = {significant(found.together.p, 2)})"]
+    return f"{since}: {', '.join(sentences)}{_tool(drift)}."
 
 
 def moved(change: Change) -> str:
@@ -93,7 +93,7 @@ def _tool(drift: Drift) -> str:
 
 
 ANGULAR = ("joint", "orientation", "joint_rad")
-BELIEVED = "_believed"
+ASSUMED_SUFFIX = "_believed"
 
 
 def both(drift: Drift) -> Html:
@@ -142,8 +142,8 @@ def _ranges(one: Calibration) -> Iterator[tuple[str, str]]:
 
 
 def _noise(model: ModelFile) -> Iterator[tuple[str, str]]:
-    for name in (n for n in model.noise if n.endswith(BELIEVED)):
-        source = name.removesuffix(BELIEVED)
+    for name in (n for n in model.noise if n.endswith(ASSUMED_SUFFIX)):
+        source = name.removesuffix(ASSUMED_SUFFIX)
         found = model.noise.get(source)
         if isinstance(found, float):
             yield f"noise of {source}", angle(found) if source in ANGULAR else length(found)
@@ -169,7 +169,7 @@ def _state(key: tuple[str, str], then: DiagnosisFile, now: DiagnosisFile) -> str
 
 
 TITLE = "What has changed"
-BEYOND_DOUBT = 2.0  # sigma of the change of the tool, below which a cell is not drawn
+SIGNIFICANT_SIGMAS = 2.0  # sigma of the change of the tool, below which a cell is not drawn
 
 
 def drift_chapter(drift: Drift) -> Html:
@@ -188,10 +188,10 @@ def _picture(drift: Drift) -> list[Html]:
     if room is None or tool is None:
         return [tag("p", "The effect on the tool is not drawn: the error over the workspace cannot be determined.")]
     if not drift.found:
-        doubt = length(float(np.sqrt(np.mean(tool.sigma_m[room.supported] ** 2))), 2)
-        return [tag("p", f"No change of the tool is drawn: none is beyond chance (uncertainty {doubt}, one sigma).")]
+        sigma = length(float(np.sqrt(np.mean(tool.sigma_m[room.supported] ** 2))), 2)
+        return [tag("p", f"No change of the tool is drawn: none is beyond chance (uncertainty {sigma}, one sigma).")]
     grids = tuple(grid_of(view, room.reach_m) for view in VIEWS)
-    clear = room.supported & (tool.moved_m > BEYOND_DOUBT * tool.sigma_m)
+    clear = room.supported & (tool.moved_m > SIGNIFICANT_SIGMAS * tool.sigma_m)
     cells = tuple(grid.rms(room.points_m, tool.moved_m, clear) for grid in grids)
     says = "how far the tool has moved since over the workspace, from the side and from above"
     drawing = pictures(

@@ -159,11 +159,11 @@ def _of_the_arm(name: str) -> bool:
 
 
 def _why_not(now: ModelParameter | None, then: ModelParameter | None, moved: frozenset[str]) -> str | None:
-    told = [p is not None and p.value is not None and p.sigma is not None for p in (now, then)]
-    if not any(told):
+    determined = [p is not None and p.value is not None and p.sigma is not None for p in (now, then)]
+    if not any(determined):
         return "determined by neither"
-    if not all(told):
-        return "determined only then" if told[1] else "determined only now"
+    if not all(determined):
+        return "determined only then" if determined[1] else "determined only now"
     if now is not None and now.name.partition(".")[0] in moved:
         return "drawn differently in the two rig files"
     return None
@@ -176,7 +176,7 @@ def _change(now: ModelParameter, then: ModelParameter, drawn_now: float, drawn_t
     return Change(now.name, now.unit, *values, sigma, significant=one.sigmas > limit)
 
 
-def doubt_of(changes: tuple[Change, ...], now: ModelFile, then: ModelFile) -> Floats | None:
+def covariance_of_changes(changes: tuple[Change, ...], now: ModelFile, then: ModelFile) -> Floats | None:
     """(change, change) covariance of the changes; None where one of the models has none."""
     if now.covariance is None or then.covariance is None:
         return None
@@ -190,7 +190,7 @@ def _among(record: Covariance, names: list[str]) -> Floats:
 
 
 def _together(changes: tuple[Change, ...], now: ModelFile, then: ModelFile) -> Together | None:
-    covariance = doubt_of(changes, now, then)
+    covariance = covariance_of_changes(changes, now, then)
     if covariance is None or not changes:
         return None
     scale = np.sqrt(np.diag(covariance))
@@ -221,15 +221,15 @@ class ToolChange:
     largest_sigma_m: float  # there
 
 
-def tool_change(known: KnownArm, room: Room, changes: tuple[Change, ...], doubt: Floats) -> ToolChange:
-    """`doubt` (change, change): covariance of the changes."""
+def tool_change(known: KnownArm, room: Room, changes: tuple[Change, ...], covariance: Floats) -> ToolChange:
+    """`covariance` (change, change): covariance of the changes."""
     column = index_of(known.parameters)
     own = [column[c.name] for c in changes]
     then = known.theta.copy()
     then[own] -= np.array([c.change for c in changes])
     moved = np.linalg.norm(target_at(known, known.theta, room.q_rad) - target_at(known, then, room.q_rad), axis=1)
     J = target_by_parameter(known.arm, known, known.point_m, room.q_rad)[1][..., own]
-    sigma = np.sqrt(np.maximum(np.einsum("nip,pq,niq->n", J, doubt, J, optimize=True), 0.0))
+    sigma = np.sqrt(np.maximum(np.einsum("nip,pq,niq->n", J, covariance, J, optimize=True), 0.0))
     worst = int(np.argmax(np.where(room.supported, moved, -1.0)))
     return ToolChange(moved, sigma, float(moved[worst]), float(sigma[worst]))
 
@@ -267,11 +267,11 @@ def drift_of(now: Calibration, then: Calibration, known: KnownArm | str) -> Drif
             "parameters mean different things; identify one of them again with the model of the other (--plan)"
         )
     found = compared(now.model, rig_now, then.model, rig_then)
-    doubt = doubt_of(found.changes, now.model, then.model)
+    covariance = covariance_of_changes(found.changes, now.model, then.model)
     room = None if isinstance(known, str) else room_of(known)
     tool = None
-    if room is not None and not isinstance(known, str) and doubt is not None and found.changes:
-        tool = tool_change(known, room, found.changes, doubt)
+    if room is not None and not isinstance(known, str) and covariance is not None and found.changes:
+        tool = tool_change(known, room, found.changes, covariance)
     warnings = (*_other_arm(rig_now, rig_then), *_more_than_noise(now, then))
     return Drift(now, then, found, room, tool, warnings)
 

@@ -27,7 +27,7 @@ MORE_POSES = "Measure more poses: at least 15, better 50, all over the workspace
 UNPROVED = "There is no proof on unseen rows: too few rows, or it was not asked for."
 TO_PROVE = "Measure at least 15 poses, better 50, so that some can be kept for the proof."
 
-Doubt = tuple[str, str]  # what speaks against trust, and what to do about it
+ReasonForCare = tuple[str, str]  # what speaks against trust, and what to do about it
 
 
 class Trust(Enum):
@@ -131,8 +131,8 @@ def _row(question: str, *content: str) -> Html:
 def _listed(said: Sequence[str], otherwise: str = NOTHING_AGAINST) -> list[Html]:
     if not said:
         return [tag("p", otherwise)]
-    told = [coded(text) for text in said]
-    return [tag("p", told[0])] if len(told) == 1 else [bullets(told)]
+    coded_texts = [coded(text) for text in said]
+    return [tag("p", coded_texts[0])] if len(coded_texts) == 1 else [bullets(coded_texts)]
 
 
 def coded(text: str) -> Html:

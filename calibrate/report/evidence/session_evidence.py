@@ -51,7 +51,7 @@ def weighting_of(recording: Recording, model: ModelFile) -> Weighting:
     DataError where recording and model do not belong together.
     """
     samples = recording.samples
-    bad = {row - 1 for blunder in model.blunders for row in blunder.rows}
+    bad = {row - 1 for gross_error in model.blunders for row in gross_error.rows}
     kept = np.array([row for row in range(len(samples)) if row not in bad], dtype=np.intp)
     if len(bad) > len(samples) - len(kept):
         raise _strangers(recording, f"it leaves out row {max(bad) + 1}, but there are {len(samples)}")
@@ -86,9 +86,9 @@ def noise_of(weighting: Weighting, model: ModelFile) -> VarianceFactors:
     """Sizes of noise as the model found them, over those assumed."""
     size = np.zeros(len(weighting.sources))
     for i, source in enumerate(weighting.sources):
-        found, believed = model.noise.get(source), model.noise.get(f"{source}_believed")
-        if isinstance(found, float) and isinstance(believed, float) and found > 0.0 and believed > 0.0:
-            size[i] = 2.0 * np.log(found / believed)
+        found, assumed = model.noise.get(source), model.noise.get(f"{source}_believed")
+        if isinstance(found, float) and isinstance(assumed, float) and found > 0.0 and assumed > 0.0:
+            size[i] = 2.0 * np.log(found / assumed)
     return replace(as_assumed(len(size)), log_variance=size)
 
 
@@ -200,7 +200,7 @@ class SessionEvidence:
     @property
     def left_out(self) -> int:
         """Rows that a gross error names."""
-        return len({row for blunder in self.model.blunders for row in blunder.rows})
+        return len({row for gross_error in self.model.blunders for row in gross_error.rows})
 
 
 def session_evidence(recording: Recording, model: ModelFile) -> SessionEvidence:

@@ -27,7 +27,7 @@ from calibrate.report.elements.verdict import (
     UNCHECKED,
     UNPROVED,
     WORSE_UNSEEN,
-    Doubt,
+    ReasonForCare,
     Trust,
     VerdictBox,
 )
@@ -102,9 +102,9 @@ FAILED = (Status.NOT_FINITE.name, Status.OUT_OF_STEPS.name, Status.STALLED.name)
 def session_verdict(evidence: SessionEvidence, diagnosis: DiagnosisFile | None = None) -> VerdictBox:
     """From model and recording; the thresholds are those at the top of this file and of verdict.py."""
     model = evidence.model
-    doubts = [*_doubts(evidence), *_doubts_of_rank(evidence), *_doubts_of_diagnosis(diagnosis, model)]
-    reasons = tuple(says for says, _ in doubts)
-    advice = tuple(dict.fromkeys((*(do for _, do in doubts if do), *_harmless(scatter(model)))))
+    for_care = [*_reasons(evidence), *_reasons_of_rank(evidence), *_reasons_of_diagnosis(diagnosis, model)]
+    reasons = tuple(says for says, _ in for_care)
+    advice = tuple(dict.fromkeys((*(do for _, do in for_care if do), *_harmless(scatter(model)))))
     if model.status in FAILED:
         return VerdictBox(Trust.NONE, f"No usable model: {model.says}.", reasons, (AGAIN, *advice))
     if checks_nothing(evidence.spare):
@@ -118,7 +118,7 @@ def session_verdict(evidence: SessionEvidence, diagnosis: DiagnosisFile | None =
         return VerdictBox(
             Trust.NONE, f"{_how_good(evidence, first, diagnosis)} Do not use this model.", reasons, (keep, *advice)
         )
-    if not doubts:
+    if not for_care:
         ready = "Correct poses and programs with it (`calibeam correct`), or export it (`calibeam export-model`)."
         return VerdictBox(
             Trust.GOOD, f"{_how_good(evidence, first, diagnosis)} What remains is noise.", (), (ready, *advice)
@@ -166,14 +166,14 @@ def _proved(model: ModelFile, diagnosis: DiagnosisFile | None) -> tuple[SplitRec
     return () if diagnosis is None or model.session is None else diagnosis.splits
 
 
-def _doubts(evidence: SessionEvidence) -> Iterator[Doubt]:
+def _reasons(evidence: SessionEvidence) -> Iterator[ReasonForCare]:
     model, recording = evidence.model, evidence.recording
     if model.status == Status.AT_BOUND.name:
         yield (
             f"{Status.AT_BOUND.value}.",
             ("The table of parameters below names it; check its nominal value in the rig file."),
         )
-    yield from _doubts_of_scatter(scatter(model), repeated(model))
+    yield from _reasons_of_scatter(scatter(model), repeated(model))
     yield from _noisy_sources(model.noise)
     if model.noise.get("settled") is False:
         yield "The size of the noise did not settle, and every sigma is a guess.", "Measure more poses."
@@ -184,7 +184,7 @@ def _doubts(evidence: SessionEvidence) -> Iterator[Doubt]:
             f"What remains {along} ({worst.share:.0%} of it, F = {significant(worst.f)}): the model lacks something.",
             "The figures along the joints, below, show where physics is missing; `calibeam diagnose` finds what it is.",
         )
-    yield from _doubts_of_proofs(proofs(model))
+    yield from _reasons_of_proofs(proofs(model))
     share = evidence.left_out / max(len(recording.samples), 1)
     if share > MANY_LEFT_OUT:
         yield (
@@ -197,7 +197,7 @@ def _doubts(evidence: SessionEvidence) -> Iterator[Doubt]:
         yield f"The file is damaged: {damage}.", "Keep the file as it is, and record again if you can."
 
 
-def _doubts_of_rank(evidence: SessionEvidence) -> Iterator[Doubt]:
+def _reasons_of_rank(evidence: SessionEvidence) -> Iterator[ReasonForCare]:
     """Combinations of the arm's own parameters that other poses would separate; what no pose could is no fault."""
     arm = {p.name for p in evidence.arm.parameters}
     weak = [u for u in evidence.model.unseen if not u.structural and len(u.members) > 1 and arm & set(u.members)]
@@ -208,7 +208,7 @@ def _doubts_of_rank(evidence: SessionEvidence) -> Iterator[Doubt]:
         )
 
 
-def _doubts_of_diagnosis(found: DiagnosisFile | None, model: ModelFile) -> Iterator[Doubt]:
+def _reasons_of_diagnosis(found: DiagnosisFile | None, model: ModelFile) -> Iterator[ReasonForCare]:
     """What the diagnosis of the same recording opposes; nothing where it agrees or was not made, or where the model
     is of a diagnosis and holds the physics that it found.
     """
@@ -227,7 +227,7 @@ def _doubts_of_diagnosis(found: DiagnosisFile | None, model: ModelFile) -> Itera
     )
 
 
-def _doubts_of_scatter(found: ScatterTest | None, repeats: Repeated | None) -> Iterator[Doubt]:
+def _reasons_of_scatter(found: ScatterTest | None, repeats: Repeated | None) -> Iterator[ReasonForCare]:
     if found is None:
         return
     if found.alarm is Alarm.ABOVE_STATED:
@@ -257,23 +257,23 @@ def _harmless(found: ScatterTest | None) -> Iterator[str]:
         )
 
 
-def _noisy_sources(noise: Fields) -> Iterator[Doubt]:
+def _noisy_sources(noise: Fields) -> Iterator[ReasonForCare]:
     """Which of several sources is worse than assumed."""
     names = [n.removesuffix("_believed") for n in noise if n.endswith("_believed")]
     for name in names if len(names) > 1 else ():
-        found, believed = noise.get(name), noise.get(f"{name}_believed")
-        if isinstance(found, float) and isinstance(believed, float) and found > NOISIER * believed > 0.0:
-            times = significant(found / believed)
+        found, assumed = noise.get(name), noise.get(f"{name}_believed")
+        if isinstance(found, float) and isinstance(assumed, float) and found > NOISIER * assumed > 0.0:
+            times = significant(found / assumed)
             yield f"The noise of {name} is {times} times the assumed one.", f"Check the instrument: {name}."
 
 
-def _doubts_of_proofs(found: tuple[UnseenRows, ...]) -> Iterator[Doubt]:
-    told = set[str]()
+def _reasons_of_proofs(found: tuple[UnseenRows, ...]) -> Iterator[ReasonForCare]:
+    reported = set[str]()
     for proof in found:
         # Rows elsewhere than the others are missed by what these leave open, too: no fault of the model, and an error.
-        if proof.split in told or not isfinite(proof.chi_after) or proof.chi_after <= WORSE_UNSEEN:
+        if proof.split in reported or not isfinite(proof.chi_after) or proof.chi_after <= WORSE_UNSEEN:
             continue
-        told.add(proof.split)
+        reported.add(proof.split)
         predicted = proof.chi_predicted
         sigmas = "" if predicted is None else f" ({significant(predicted)} times what noise and sigmas predict)"
         yield (

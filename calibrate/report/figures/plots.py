@@ -106,9 +106,9 @@ def _library() -> str:
 
 def _plot(plot: Plot) -> tuple[Html, Html]:
     content = (plot.name, plot.traces, plot.layout, CONFIG)
-    told = ", ".join(msgspec.json.encode(part).decode() for part in content)
+    arguments = ", ".join(msgspec.json.encode(part).decode() for part in content)
     drawing = tag("div", "", id=plot.name, cls="plot", role="img", aria_label=plot.says)
-    return tag("figure", drawing, tag("figcaption", plot.caption)), _script(f"Plotly.newPlot({told});")
+    return tag("figure", drawing, tag("figcaption", plot.caption)), _script(f"Plotly.newPlot({arguments});")
 
 
 def _script(text: str) -> Html:

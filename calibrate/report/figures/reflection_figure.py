@@ -69,7 +69,7 @@ def _behind(data: Observations, placement: int) -> list[int]:
 def _path(rig: FittedRig, data: Observations, pose: int) -> Floats:
     """(3, 3) m: some way in front of the first face, first spot, second spot."""
     points = rig.struck_m(int(data.placement[pose]), int(data.first_psd[pose]), data.spots_m[pose])
-    _, direction = rig.believed.beam(data.q_rad[pose])
+    _, direction = rig.assumed.beam(data.q_rad[pose])
     return np.stack([points[0] - IN_FRONT * float(np.linalg.norm(points[1] - points[0])) * direction, *points])
 
 

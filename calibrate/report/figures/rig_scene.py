@@ -20,13 +20,13 @@ Floats = NDArray[np.float64]
 class FittedRig:
     """The rig with everything that the fit corrected."""
 
-    believed: AssumedRig
+    assumed: AssumedRig
     T_psd1_psd2: Floats  # (4, 4)
     half_size_m: float
 
     def faces(self, placement: int) -> Floats:
         """(2, 4, 4) T_base_psd1, T_base_psd2 of one placement."""
-        T_base_psd1 = self.believed.T_base_psd1(placement)
+        T_base_psd1 = self.assumed.T_base_psd1(placement)
         return np.stack([T_base_psd1, T_base_psd1 @ self.T_psd1_psd2])
 
     def struck_m(self, placement: int, first_psd: int, spots_m: Floats) -> Floats:
@@ -86,8 +86,8 @@ def most_centred(data: Observations, placement: int, first_psd: int | None = Non
 
 def _standing(rig: FittedRig, data: Observations, pose: int) -> StandingArm:
     q_rad, placement, first = data.q_rad[pose], int(data.placement[pose]), int(data.first_psd[pose])
-    frames = rig.believed.arm.frames(q_rad[None])[0]
-    laser_m, _ = rig.believed.beam(q_rad)
+    frames = rig.assumed.arm.frames(q_rad[None])[0]
+    laser_m, _ = rig.assumed.beam(q_rad)
     beam_m = np.stack([laser_m, *rig.struck_m(placement, first, data.spots_m[pose])])
     return StandingArm(placement, first, _bones(frames, laser_m), frames[:-1, :3, 3], beam_m)
 

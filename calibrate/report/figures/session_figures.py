@@ -62,15 +62,15 @@ def _standing(drawn: Scene) -> Iterator[Trace]:
 
 def _faces(drawn: Scene) -> Iterator[Trace]:
     for i, (place, corners) in enumerate(drawn.faces_m.items()):
-        parted = np.concatenate([np.concatenate([c, c[:1], np.full((1, 3), np.nan)]) for c in corners])
-        yield line3(parted, f"faces at station {place}", TONES[i % len(TONES)], width=5.0)
+        outlines = np.concatenate([np.concatenate([c, c[:1], np.full((1, 3), np.nan)]) for c in corners])
+        yield line3(outlines, f"faces at station {place}", TONES[i % len(TONES)], width=5.0)
 
 
 def _beams(session: SpotSession, rig: FittedRig) -> Iterator[Trace]:
     data = session.data
     parts = [
         np.concatenate(
-            [rig.believed.beam(q)[0][None], rig.struck_m(int(place), int(first), spots), np.full((1, 3), np.nan)]
+            [rig.assumed.beam(q)[0][None], rig.struck_m(int(place), int(first), spots), np.full((1, 3), np.nan)]
         )
         for q, place, first, spots in zip(data.q_rad, data.placement, data.first_psd, data.spots_m, strict=True)
     ]
@@ -83,7 +83,7 @@ def _lasers(session: SpotSession, rig: FittedRig) -> Trace:
     return {
         "type": "scatter3d",
         "mode": "markers",
-        **coordinates(np.array([rig.believed.beam(q)[0] for q in session.data.q_rad])),
+        **coordinates(np.array([rig.assumed.beam(q)[0] for q in session.data.q_rad])),
         "name": "laser",
         "marker": {"size": 4, "color": numbers(error), "colorscale": "Cividis", "reversescale": True, "colorbar": bar},
         "text": _spot_labels(session),

@@ -108,7 +108,7 @@ def _observability(model: ModelFile) -> Iterator[Html]:
 def _numbers(evidence: SessionEvidence, known: list[ModelParameter]) -> Html:
     if not known:
         return tag("p", "No single parameter is determined alone; together they predict (model.json: chain).")
-    believed = {p.name: p for p in evidence.parameters}
+    assumed = {p.name: p for p in evidence.parameters}
     drawn = any(p.bootstrap_sigma is not None for p in known)
     head = (
         "Parameter",
@@ -122,7 +122,7 @@ def _numbers(evidence: SessionEvidence, known: list[ModelParameter]) -> Html:
     numbers = [_number(p) for p in known]
     values, sigmas = (aligned(list(column)) for column in zip(*(n[:2] for n in numbers), strict=True))
     rows = [
-        (tag("code", p.name), in_plain_words(p.name), value, sigma, *_by_refits(p, drawn), unit, _source(p, believed))
+        (tag("code", p.name), in_plain_words(p.name), value, sigma, *_by_refits(p, drawn), unit, _source(p, assumed))
         for p, value, sigma, (_, _, unit) in zip(known, values, sigmas, numbers, strict=True)
     ]
     return halves(table(head, rows, numeric=(2, 3, 4) if drawn else (2, 3)), terse=True)
@@ -143,8 +143,8 @@ def _by_refits(found: ModelParameter, drawn: bool) -> tuple[str, ...]:
     return (DASH,) if found.bootstrap_sigma is None else (significant(scale * found.bootstrap_sigma, 2),)
 
 
-def _source(found: ModelParameter, believed: dict[str, Parameter]) -> str:
-    own = believed.get(found.name)
+def _source(found: ModelParameter, assumed: dict[str, Parameter]) -> str:
+    own = assumed.get(found.name)
     drawing = own is not None and (found.sigma or 0.0) > LEARNED * own.prior
     return "nominal" if drawing else "data"
 

@@ -11,10 +11,10 @@ from calibrate.model.sensors.kind import NoiseSource
 from calibrate.quantities import (
     DASH,
     angle,
-    doubted_angle,
-    doubted_length,
+    angle_with_sigma,
     fixed,
     length,
+    length_with_sigma,
     significant,
 )
 from calibrate.report.elements.html import (
@@ -137,17 +137,17 @@ def _drawn_rows(model: ModelFile) -> list[Html]:
 def _noise(model: ModelFile, rig: Rig) -> Html:
     rows: list[tuple[str, ...]] = []
     for name in [n.removesuffix("_believed") for n in model.noise if n.endswith("_believed")]:
-        believed, found, sigma = (model.noise.get(f"{name}{tail}") for tail in ("_believed", "", "_sigma"))
-        if not (isinstance(believed, float) and isinstance(found, float) and isinstance(sigma, float)):
+        assumed, found, sigma = (model.noise.get(f"{name}{tail}") for tail in ("_believed", "", "_sigma"))
+        if not (isinstance(assumed, float) and isinstance(found, float) and isinstance(sigma, float)):
             continue
         source_of = {**SOURCES, JOINT: OF_JOINTS}.get(name, NoiseSource(name, "m"))
-        says, doubted = (angle, doubted_angle) if source_of.unit == "rad" else (length, doubted_length)
+        says, with_sigma = (angle, angle_with_sigma) if source_of.unit == "rad" else (length, length_with_sigma)
         stated = getattr(rig.noise, source_of.key, None) is not None
         source = "rig file" if stated else "assumed: the rig file states none"
         if model.noise.get(f"{name}_at_zero"):
-            rows.append((name, says(believed), source, NONE, ""))
+            rows.append((name, says(assumed), source, NONE, ""))
             continue
-        rows.append((name, says(believed), source, doubted(found, sigma), fixed(found / believed, 2)))
+        rows.append((name, says(assumed), source, with_sigma(found, sigma), fixed(found / assumed, 2)))
     head = ("Noise of", "assumed", "by", "found in the residuals", "found / assumed")
     return table(head, rows, numeric=(1, 3, 4), caption="Noise, one sigma of one coordinate")
 

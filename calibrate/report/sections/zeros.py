@@ -5,7 +5,7 @@ from math import degrees, hypot
 
 from matplotlib.figure import Figure
 
-from calibrate.fit.fit_plan import BesideName, parse_plan
+from calibrate.fit.fit_plan import MethodName, parse_plan
 from calibrate.fit.identify.estimates import Estimate, JointZero, joint_zeros
 from calibrate.fit.identify.point_constraint import PointConstraintResult, point_constraints
 from calibrate.fit.identify.session import rig_as_planned
@@ -41,10 +41,10 @@ ROW_IN = 0.3
 def zero_uncertainties(zeros: Sequence[JointZero]) -> Html:
     """Sigma of every determined zero, and what the measurement alone leaves of it."""
     says = "sigma of each joint zero on a logarithmic axis, in all and of the measurement alone"
-    return drawn("zero-doubts", says, 4.8, 1.0 + ROW_IN * len(zeros), lambda figure: _paint_doubts(figure, zeros))
+    return drawn("zero-doubts", says, 4.8, 1.0 + ROW_IN * len(zeros), lambda figure: _paint_sigmas(figure, zeros))
 
 
-def _paint_doubts(figure: Figure, zeros: Sequence[JointZero]) -> None:
+def _paint_sigmas(figure: Figure, zeros: Sequence[JointZero]) -> None:
     axes = figure.add_subplot()
     alone, total = ("measurement alone", "in all") if zeros else (None, None)
     for row, zero in enumerate(zeros):
@@ -189,7 +189,7 @@ LEAD = (
 def asked_for(evidence: SessionEvidence) -> bool:
     """Whether the plan of the model names this method."""
     plan = evidence.model.plan
-    return plan is not None and parse_plan(plan, "fit plan in the model").method is BesideName.POINT_CONSTRAINT
+    return plan is not None and parse_plan(plan, "fit plan in the model").method is MethodName.POINT_CONSTRAINT
 
 
 def point(evidence: SessionEvidence) -> Html:
@@ -221,10 +221,10 @@ def _one(result: PointConstraintResult, full: Sequence[JointZero], name: str) ->
         f"The lines miss their common point by {length(result.rms_distance_before_m)} rms distance before the fit, by "
         f"{length(result.rms_distance_after_m)} after it. Fit: {result.status.value}.",
     )
-    yield _beside(result, full)
+    yield _point_constraint_block(result, full)
 
 
-def _beside(result: PointConstraintResult, full: Sequence[JointZero]) -> Html:
+def _point_constraint_block(result: PointConstraintResult, full: Sequence[JointZero]) -> Html:
     others = {z.joint: z for z in full}
     rows: list[tuple[str, ...]] = []
     for zero in result.zeros:

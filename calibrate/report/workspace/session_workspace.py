@@ -45,9 +45,9 @@ def session_measured(evidence: SessionEvidence, known: KnownArm) -> MeasuredErro
         if left is None:
             continue
         found = np.linalg.norm(left[:, :3], axis=1)
-        told = np.isfinite(found)
+        finite = np.isfinite(found)
         points = target_at(known, known.theta, evidence.recording.samples.joints()[readings.rows[:, 0]])
-        return MeasuredErrors(points[told], readings.error_before[told], found[told])
+        return MeasuredErrors(points[finite], readings.error_before[finite], found[finite])
     return None
 
 
@@ -63,11 +63,11 @@ def deleted_misfit(problem: JointProblem, index: int, theta: Floats, covariance:
     shape = block.observed.shape
     J = problem.jacobian_of(index, theta).reshape(*shape, len(theta))
     rest = np.eye(shape[1]) - np.einsum("nip,pq,njq->nij", J, covariance, J, optimize=True)
-    told = np.linalg.eigvalsh(rest)[:, 0] > ALONE
+    determined = np.linalg.eigvalsh(rest)[:, 0] > ALONE
     out = np.full(shape, np.nan)
-    residual = problem.residual_of(index, theta).reshape(shape)[told]
-    whitened = np.linalg.solve(rest[told], residual[..., None])
-    out[told] = np.linalg.solve(block.whitener[told], whitened)[..., 0]
+    residual = problem.residual_of(index, theta).reshape(shape)[determined]
+    whitened = np.linalg.solve(rest[determined], residual[..., None])
+    out[determined] = np.linalg.solve(block.whitener[determined], whitened)[..., 0]
     return out
 
 
@@ -87,12 +87,12 @@ def workspace(room: Room | str, measured: MeasuredErrors | None, why_not_measure
         "Predicted: one sigma, from the covariance of the fit and the scatter of a single pose, if the model is "
         "complete; where base and device stand is left out."
     )
-    told = (
+    explained = (
         "Measured: distance of each reading from what is expected; for the calibrated arm each pose is predicted from "
         "all other poses. Where measured is worse than predicted, the model lacks something there."
         if measured is not None
         else why_not_measured
     )
-    pictures = tag("div", figure(before_and_after(room, measured), f"{caption} {told}"), cls="wide")
+    pictures = tag("div", figure(before_and_after(room, measured), f"{caption} {explained}"), cls="wide")
     within = f"Of the poses between the joint angles of the session, {share:.0%} are covered by the calibration poses."
     return section("workspace", WORKSPACE_TITLE, LEAD, pictures, tag("p", within))

@@ -96,7 +96,7 @@ def test_where_a_box_is_in_the_way_of_one_posture_another_is_taken(camera_rig, c
     np.testing.assert_array_equal(stuck.q_rad, home_rad)
 
 
-def test_of_two_poses_that_look_alike_the_one_that_was_believed_is_taken(camera_rig, camera_plain) -> None:
+def test_of_two_poses_that_look_alike_the_one_that_was_assumed_is_taken(camera_rig, camera_plain) -> None:
     """A small board seen flat on: its mirror twin fits the corners as well."""
     eye = DirectEye(direct_bench(camera_rig, camera_plain, seed=1).world, camera_plain)
     flat = transform((0.02, 0.01, 0.45), (np.pi - 0.2, 0.0, 0.0))
@@ -119,11 +119,11 @@ def test_of_two_poses_that_look_alike_the_one_that_was_believed_is_taken(camera_
     to_fixture = np.linalg.inv(transform(board.in_psd1.origin_m, board.in_psd1.rotation_rad))
     before = learner.arm.flange(q_rad) @ drawn(camera_rig.camera).T_flange_camera
     for T, _ in poses:
-        believed = before @ T @ to_fixture
-        assert apart(sight.fixture(learner.arm, q_rad, believed), believed)[1] < 1e-9
+        assumed = before @ T @ to_fixture
+        assert apart(sight.fixture(learner.arm, q_rad, assumed), assumed)[1] < 1e-9
 
 
-class Told:
+class EventLog:
     def __init__(self) -> None:
         self.events = []
 
@@ -138,7 +138,7 @@ def test_a_session_finds_a_fixture_by_camera_that_stands_far_from_where_the_rig_
 ) -> None:
     """60 mm and 12 deg off: the beam misses all, and the camera sees by how much. No search is needed."""
     world = coarse_aim.measured_world(camera_rig, camera_plain, np.random.default_rng(8))
-    learner, bench, told = world.learner, world.bench, Told()
+    learner, bench, log = world.learner, world.bench, EventLog()
 
     class Astray(FittedLearner):
         def T_base_fixture(self, placement: int) -> np.ndarray:
@@ -147,10 +147,10 @@ def test_a_session_finds_a_fixture_by_camera_that_stands_far_from_where_the_rig_
 
     astray = Astray(camera_rig)
     sight = sight_of(camera_rig, world.eye, world.model)
-    navigator = Navigator(bench, astray, told, bench.standing_rad, 1, sight)
+    navigator = Navigator(bench, astray, log, bench.standing_rad, 1, sight)
     bench.move(bench.standing_rad)
     navigator.find(world.placement, 1, 0.0)
-    kinds = [kind for kind, _ in told.events]
+    kinds = [kind for kind, _ in log.events]
     assert "search" not in kinds
     assert all(bench.look(0.01).lit(1))
     assert apart(astray.T_base_fixture(world.placement), true_fixture(bench, world.placement))[0] > 0.04
@@ -158,9 +158,9 @@ def test_a_session_finds_a_fixture_by_camera_that_stands_far_from_where_the_rig_
 
 
 def test_without_sight_of_the_board_the_session_searches(camera_rig, camera_plain) -> None:
-    bench, learner, told = direct_bench(camera_rig, camera_plain, seed=3), FittedLearner(camera_rig), Told()
-    navigator = Navigator(bench, learner, told, bench.standing_rad, 1, sight_of(camera_rig, Blind()))
+    bench, learner, log = direct_bench(camera_rig, camera_plain, seed=3), FittedLearner(camera_rig), EventLog()
+    navigator = Navigator(bench, learner, log, bench.standing_rad, 1, sight_of(camera_rig, Blind()))
     navigator.find(1, 1, 0.0)
-    kinds = [kind for kind, _ in told.events]
+    kinds = [kind for kind, _ in log.events]
     assert kinds[-1] == "centring"
-    assert ("aim", {"aimed": "UNSEEN", "motions": 0}) in told.events or "search" not in kinds
+    assert ("aim", {"aimed": "UNSEEN", "motions": 0}) in log.events or "search" not in kinds

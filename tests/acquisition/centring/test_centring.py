@@ -80,12 +80,12 @@ def test_a_step_that_loses_the_light_is_halved_until_it_is_back() -> None:
 def test_after_a_loss_the_next_step_keeps_the_light() -> None:
     """A strategy that knows nothing: every step of its own length leads across the whole face."""
 
-    class Wild(Stubborn):
+    class Overshooting(Stubborn):
         def propose(self, target_m: np.ndarray) -> Proposal:
             return Proposal(0.16 * np.roll(ONE, len(self.learned) % 2), "correct")
 
     start = 0.05 * ONE
-    run = centre(Plane(start), Wide(), Wild(ONE), start, np.full(4, 1.0), Limits(max_steps=3))
+    run = centre(Plane(start), Wide(), Overshooting(ONE), start, np.full(4, 1.0), Limits(max_steps=3))
     assert [bool(np.isfinite(step.spots_m).all()) for step in run.trace] == [True, False, True, True]
     assert run.losses == 1
 

@@ -10,7 +10,7 @@ from calibeam.learner import FittedLearner
 
 @pytest.mark.parametrize("first", [1, 2])
 @pytest.mark.parametrize("roll_rad", [-2.0, 0.0, 1.0])
-def test_the_believed_spots_are_the_asked_for_ones(rig, first: int, roll_rad: float) -> None:
+def test_the_assumed_spots_are_the_asked_for_ones(rig, first: int, roll_rad: float) -> None:
     learner, rng = FittedLearner(rig), np.random.default_rng(3)
     T = learner.T_base_fixture(1)
     target = BeamTarget(first, (0.004, -0.003, 0.002, 0.006), 0.2, roll_rad)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from acquisition.guided.plan import GuidedVisit
-from acquisition.guided.reading import BarEnd, Cone, Doubt, SphereSpot
+from acquisition.guided.reading import BarEnd, Cone, OffTarget, SphereSpot
 from acquisition.guided.session import GuidedSession
 from acquisition.guided.stillness import Window
 from drivers.errors import DeviceLost
@@ -28,7 +28,7 @@ class Hand:
     """Watch and guide in one: stands where it was asked to, off by `off_m` at chosen requests."""
 
     def __init__(self, off_m=None, gone_after=None, absent=()):
-        self.q, self.t, self.requests, self.told = np.zeros(6), 0.0, [], []
+        self.q, self.t, self.requests, self.progress = np.zeros(6), 0.0, [], []
         self.off_m, self.gone_after, self.absent = off_m or {}, gone_after, absent
 
     def ask(self, request):
@@ -40,7 +40,7 @@ class Hand:
         return True
 
     def tell(self, progress):
-        self.told.append(progress)
+        self.progress.append(progress)
 
     def next(self, seconds):
         if self.gone_after is not None and len(self.requests) > self.gone_after:
@@ -61,9 +61,9 @@ class Ruler:
     def learn(self, readings):
         self.learned.append(len(readings))
 
-    def doubt(self, visit):
+    def off_target(self, visit):
         miss = max(float(np.linalg.norm(r.q_rad[:3] - np.array(r.target.point_m))) for r in visit)
-        return Doubt(miss, 20.0) if miss > 1e-4 else None
+        return OffTarget(miss, 20.0) if miss > 1e-4 else None
 
 
 class Journal:
@@ -110,7 +110,7 @@ def test_both_ends_are_taken_again_when_their_length_cannot_be():
     assert len(journal.rows) == 2
 
 
-def test_what_stays_in_doubt_is_taken_and_told():
+def test_what_stays_uncertain_is_taken_and_reported():
     made, journal = session(Hand(off_m=dict.fromkeys(range(1, 10), 5e-4)))
     summary = made.run([GuidedVisit((CONE,))])
     assert (len(summary.readings), summary.slips, summary.doubted) == (1, 3, 1)
@@ -124,11 +124,11 @@ def test_a_probe_that_does_not_come_is_left_out_in_the_end():
     assert journal.events == [("skipped", {"target": "cone 1", "why": "no reading in 4 attempts"})]
 
 
-def test_a_still_probe_elsewhere_is_told_and_waited_for():
+def test_a_still_probe_at_another_place_is_reported_and_waited_for():
     hand = Hand(off_m=dict.fromkeys(range(1, 10), 0.2))
     made, _ = session(hand, patience_s=5.0)
     assert made.run([GuidedVisit((CONE,))]).skipped == 1
-    assert "200 mm from cone 1" in hand.told[0].says
+    assert "200 mm from cone 1" in hand.progress[0].says
 
 
 def test_the_same_standstill_is_read_once():
@@ -160,7 +160,7 @@ def test_a_cone_is_not_read_twice_in_one_posture():
     made, _ = session(hand, patience_s=5.0)
     first, second = made.run([GuidedVisit((CONE,)), GuidedVisit((CONE,))]).readings
     assert np.abs(first.q_rad - second.q_rad).max() > 0.1
-    assert "turn some joint by 6°" in hand.told[0].says
+    assert "turn some joint by 6°" in hand.progress[0].says
 
 
 def spot(x, y, z):
@@ -179,10 +179,10 @@ class Sways(Hand):
 def test_a_sphere_is_not_touched_twice_at_one_spot():
     hand = Sways()
     made, _ = session(hand, patience_s=5.0)
-    beside = [spot(0.5, 0.0, 0.1), spot(0.5, 0.0012, 0.1), spot(0.5, 0.003, 0.1)]
-    summary = made.run([GuidedVisit((one,)) for one in beside])
+    nearby = [spot(0.5, 0.0, 0.1), spot(0.5, 0.0012, 0.1), spot(0.5, 0.003, 0.1)]
+    summary = made.run([GuidedVisit((one,)) for one in nearby])
     assert (len(summary.readings), summary.skipped) == (2, 1)
-    assert "2 mm or more beside every earlier spot" in hand.told[0].says
+    assert "2 mm or more beside every earlier spot" in hand.progress[0].says
 
 
 def test_a_touch_that_leaves_all_in_one_plane_is_refused_and_the_session_goes_on():
@@ -191,7 +191,7 @@ def test_a_touch_that_leaves_all_in_one_plane_is_refused_and_the_session_goes_on
     ring = [spot(0.5 + 0.01 * np.cos(a), 0.01 * np.sin(a), 0.1) for a in np.arange(5.0)]
     summary = made.run([GuidedVisit((one,)) for one in (*ring, spot(0.5, 0.0, 0.11))])
     assert (len(summary.readings), summary.skipped) == (5, 1)
-    assert any("in one plane" in progress.says for progress in hand.told)
+    assert any("in one plane" in progress.says for progress in hand.progress)
 
 
 def test_what_was_taken_before_the_encoders_went_is_kept():

@@ -397,7 +397,7 @@ def test_interrupted_anywhere_the_arm_is_stopped(where: str) -> None:
     assert arm.stops[-1] == "stop"
 
 
-def test_what_was_not_planned_or_stands_elsewhere_is_refused() -> None:
+def test_what_was_not_planned_or_stands_at_another_place_is_refused() -> None:
     gate = gate_of(Arm())
     made = gate.plan(HOME_RAD, there(0.1, 0.0, 0.0))
     with pytest.raises(RefusedMotionError, match=r"joint 2 stands 2\.86° from where the plan begins"):

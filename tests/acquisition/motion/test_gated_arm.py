@@ -49,8 +49,8 @@ def test_an_arm_that_stands_too_near_a_box_may_leave_it_but_not_come_nearer() ->
     flange_m = ARM.frames(HOME_RAD[None])[0, -1, :3, 3]
     turn_rad = np.array([0.5, 0, 0, 0, 0, 0])
     away_m = ARM.frames((HOME_RAD + turn_rad)[None])[0, -1, :3, 3] - flange_m
-    beside_m = flange_m - 0.08 * away_m / np.linalg.norm(away_m)  # behind the arm as it turns away
-    post = Box("post", tuple(beside_m - 0.04), tuple(beside_m + 0.04))
+    post_m = flange_m - 0.08 * away_m / np.linalg.norm(away_m)  # behind the arm as it turns away
+    post = Box("post", tuple(post_m - 0.04), tuple(post_m + 0.04))
     assert post.distance_m(flange_m) < Cell().clearance_m
     assert moved(Cell(keep_out=(post,)), HOME_RAD + turn_rad).moves
     with pytest.raises(RefusedMotionError, match="keep-out box 'post'"):

@@ -84,7 +84,7 @@ def test_random_programs_never_jump(seed: int) -> None:
     assert (found.max(axis=0) < SMOOTH).all(), found
 
 
-def test_a_path_whose_speed_jumps_is_told() -> None:
+def test_a_path_whose_speed_jumps_is_reported() -> None:
     """The same judge on a path without transitions, and on one whose transition has no matching acceleration."""
     sharp = lambda t: np.array([abs(t - 1.0)])  # noqa: E731
     parabola = lambda t: np.array([0.0 if t < 1.0 else 3.0 * (t - 1.0) ** 2])  # noqa: E731

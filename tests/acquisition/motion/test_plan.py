@@ -82,15 +82,15 @@ def test_an_area_too_slow_for_the_path_is_named_with_the_segment() -> None:
         plan(SOLVER, HOME_RAD, [to(0.01, 0.0, 0.0), to(0.2, 0.2, 0.0, by=By.JOINTS)], PACE, Cell(slow=(area,)))
 
 
-def test_a_link_beside_the_line_between_its_joints_is_part_of_the_body() -> None:
+def test_a_link_next_to_the_line_between_its_joints_is_part_of_the_body() -> None:
     """The upper arm of a UR5e: its centre of mass is 0.113 m beside the line from shoulder to elbow."""
     cell = cell_of(load_rig(RIG))
     frames = ur5e().frames(HOME_RAD[None])
-    plain, beside = (body_points(frames, cell.tool_m, com)[0] for com in ((), cell.com_m))
+    plain, off_path = (body_points(frames, cell.tool_m, com)[0] for com in ((), cell.com_m))
     shoulder_m, elbow_m = frames[0, 1, :3, 3], frames[0, 2, :3, 3]
     middle_m = 0.5 * (shoulder_m + elbow_m) + 0.11336 * frames[0, 2, :3, 2]
     assert np.linalg.norm(plain - middle_m, axis=1).min() > 0.1
-    assert np.linalg.norm(beside - middle_m, axis=1).min() < 0.035  # points are 6 cm apart along the link
+    assert np.linalg.norm(off_path - middle_m, axis=1).min() < 0.035  # points are 6 cm apart along the link
 
 
 def test_a_share_of_the_speed_is_one_of_the_turn_as_well() -> None:

@@ -117,14 +117,14 @@ def test_how_far_off_its_plan_an_arm_was_is_square_to_its_way() -> None:
     goal[1, 3] += 0.1
     made = plan(SOLVER, POSTURE_RAD, [Segment("aside", By.LINE, Place("aside", goal, np.eye(4)))], PACE, Cell())
     on_it, aside = made.q_rad[5:30], transform((3e-4, 0.0, 4e-4))
-    beside = [SOLVER.kept(aside @ SOLVER.flange(q_rad), q_rad) for q_rad in on_it]
+    off_path = [SOLVER.kept(aside @ SOLVER.flange(q_rad), q_rad) for q_rad in on_it]
     exact = deviation([(made, on_it)])
-    off = deviation([(made, np.array(beside))])
+    off = deviation([(made, np.array(off_path))])
     assert exact is not None
     assert exact.largest_m < 1e-8
     assert off is not None
     assert (off.largest_m, off.rms_m) == pytest.approx((5e-4, 5e-4), rel=1e-3)
-    half = deviation([(made, np.concatenate([on_it, beside]))])
+    half = deviation([(made, np.concatenate([on_it, off_path]))])
     assert half is not None
     assert (half.largest_m, half.rms_m) == pytest.approx((5e-4, 5e-4 / np.sqrt(2.0)), rel=1e-3)
     assert deviation([(made, np.empty((0, 6)))]) is None

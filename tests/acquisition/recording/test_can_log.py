@@ -107,7 +107,7 @@ def test_what_python_can_reads_of_our_blf_is_what_was_heard(record_frames, tmp_p
     assert all(m.is_rx for m in found)
 
 
-def test_sent_frames_are_told_from_heard_ones(record_frames, tmp_path: Path) -> None:
+def test_sent_frames_are_distinguished_from_heard_ones(record_frames, tmp_path: Path) -> None:
     export_can(record_frames(messages()[:5], sent=True), tmp_path / "bus.blf")
     with can.BLFReader(tmp_path / "bus.blf") as reader:
         assert not any(message.is_rx for message in reader)
@@ -171,7 +171,7 @@ def test_channels_whose_names_fold_into_one_keep_their_own_streams() -> None:
     assert [name for name, bus in named.items() if bus in ("a/b", "a.b", None)] == ["can-a-b", "can-a-b-2", "can"]
 
 
-def test_of_a_torn_log_what_came_before_is_kept_and_told(record_frames, tmp_path: Path, rig_source: str) -> None:
+def test_of_a_torn_log_what_came_before_is_kept_and_reported(record_frames, tmp_path: Path, rig_source: str) -> None:
     export_can(record_frames(messages()), tmp_path / "bus.csv")
     text = (tmp_path / "bus.csv").read_text()
     lines = text.splitlines()

@@ -48,11 +48,11 @@ def test_each_problem_is_found_where_it_is(
     assert record(open_writer, device_s, sequence, t_s) == found
 
 
-def test_a_session_cut_short_is_told(open_writer: Open) -> None:
+def test_a_session_cut_short_is_reported(open_writer: Open) -> None:
     assert record(open_writer, [0.0], [0], [0.0], complete=False) == {(Problem.INCOMPLETE, "file")}
 
 
-def test_a_torn_file_is_told_as_damaged_and_incomplete(open_writer: Open) -> None:
+def test_a_torn_file_is_reported_as_damaged_and_incomplete(open_writer: Open) -> None:
     with open_writer() as writer:
         writer.sample({"t_s": 0.0, "q1_rad": 0.0, "q2_rad": 0.0})
     writer.path.write_bytes(writer.path.read_bytes()[:-20])

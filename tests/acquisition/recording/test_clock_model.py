@@ -68,7 +68,7 @@ def test_a_clock_that_changes_its_pace_wanders(device_s: Floats) -> None:
         (np.zeros(100), ClockStatus.TOO_SHORT),
     ],
 )
-def test_what_cannot_be_told_is_not_told(times_s: Floats, status: ClockStatus) -> None:
+def test_what_cannot_be_reported_is_not_reported(times_s: Floats, status: ClockStatus) -> None:
     model = clock_model(stream(times_s, np.arange(times_s.size) * 1.0))
     assert model.status is status
     assert model.rate is None

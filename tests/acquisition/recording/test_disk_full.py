@@ -50,16 +50,16 @@ def append(stream: StreamWriter, first: int, count: int) -> None:
     stream.append(1000.0 + number * 1e-3, number, number, {"spot_x_m": values})
 
 
-def test_a_full_disk_is_told_and_costs_only_what_did_not_fit(open_writer: Open, disk: SmallDisk) -> None:
+def test_a_full_disk_is_reported_and_costs_only_what_did_not_fit(open_writer: Open, disk: SmallDisk) -> None:
     writer = open_writer()
     stream = writer.stream("psd", (SPOT,))
     append(stream, 0, 1501)
     writer.flush()
     disk.room = 500
     append(stream, 1501, 1000)
-    with pytest.raises(RecordingError) as told:
+    with pytest.raises(RecordingError) as lines:
         writer.flush()
-    assert str(told.value) == (
+    assert str(lines.value) == (
         f"disk full (No space left on device): 1.5 s recorded are safe in {writer.path}; free space and resume"
     )
     for another_try in (lambda: append(stream, 2501, 1), lambda: writer.sample(SAMPLE), writer.flush, writer.close):
@@ -130,7 +130,7 @@ def test_who_measures_does_not_wait_for_a_stalled_disk(open_writer: Open, monkey
     assert read(writer.path).streams["psd"].sequence.tolist() == list(range(5000))
 
 
-def test_a_disk_that_falls_behind_is_told_before_memory_runs_out() -> None:
+def test_a_disk_that_falls_behind_is_reported_before_memory_runs_out() -> None:
     spool: Spool[str] = Spool("session.mcap", limit_bytes=3 << 20)
     spool.put("a", 2 << 20)
     with pytest.raises(RecordingError, match=r"session.mcap: the disk is too slow, 2 MiB wait"):

@@ -61,9 +61,9 @@ def test_a_rig_beyond_all_bounds_is_refused_in_one_short_message(tmp_path: Path,
     path.write_text(RIG.replace(old, new, 1))
     with pytest.raises(RigFileError) as refused:
         load_rig(path)
-    told = str(refused.value).replace(str(tmp_path), ".")
-    assert says in told
-    assert len(told) <= MESSAGE_LENGTH
+    lines = str(refused.value).replace(str(tmp_path), ".")
+    assert says in lines
+    assert len(lines) <= MESSAGE_LENGTH
 
 
 def test_a_rig_that_is_not_utf8_is_refused_with_its_line(tmp_path: Path) -> None:

@@ -123,7 +123,7 @@ def test_a_damaged_rig_can_be_given_again(source: Path, tmp_path: Path, rig_sour
     assert len(read(tmp_path / "recovered.mcap").samples) == BATCHES
 
 
-def test_a_lost_start_is_told_and_not_made_up(source: Path, tmp_path: Path) -> None:
+def test_a_lost_start_is_reported_and_not_made_up(source: Path, tmp_path: Path) -> None:
     source.write_bytes(source.read_bytes().replace(b"1000.0", b"1600.0", 1))
     assert not recover(source, tmp_path / "recovered.mcap").whole
     recovered = read(tmp_path / "recovered.mcap")

@@ -134,7 +134,7 @@ def test_emulators_get_the_same_numbers_as_a_plain_mapping(edited: Edit) -> None
         ("a_m = 0.2", "a_m = 0.2\na_m = 0.2", 17, r"not TOML: Cannot overwrite a value"),
     ],
 )  # fmt: skip
-def test_a_mistake_is_told_with_line_key_and_remedy(edited: Edit, old: str, new: str, line: int, says: str) -> None:
+def test_a_mistake_is_reported_with_line_key_and_remedy(edited: Edit, old: str, new: str, line: int, says: str) -> None:
     text = refusal(edited(old, new))
     assert re.match(rf"rigs/x.toml line {line}[:,] ", text), text
     assert re.search(says, text), text

@@ -32,7 +32,7 @@ def test_artefacts_are_read_by_id_in_the_order_of_the_file() -> None:
         ("e_uni_per_m = 3e-5", "e_uni_m_m = 3e-5", "unknown key 'e_uni_m_m'"),
     ],
 )
-def test_what_is_wrong_is_told_with_its_place(old: str, new: str, says: str) -> None:
+def test_what_is_wrong_is_reported_with_its_place(old: str, new: str, says: str) -> None:
     assert old in TEXT
     with pytest.raises(RigFileError, match=says):
         parse_rig(TEXT.replace(old, new, 1), "rig.toml")

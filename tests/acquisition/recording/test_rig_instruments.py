@@ -38,13 +38,13 @@ def test_plain_encoders(tmp_path):
     assert len(encoders.signals) == 6
 
 
-def test_files_are_looked_for_beside_the_rig_file(tmp_path):
+def test_files_are_looked_for_next_to_the_rig_file(tmp_path):
     text = PLAIN.replace('driver = "kpa101"', 'driver = "kpa101"\nerror_maps = ["maps/1.json", ""]', 1)
     devices = loaded(tmp_path, text).devices
     assert devices.encoders.dbc == str(tmp_path / "rigs/encoders-plain.dbc")
     assert devices.psd.error_maps == (str(tmp_path / "maps/1.json"), "")
-    elsewhere = text.replace("maps/1.json", "/opt/maps/1.json")
-    assert loaded(tmp_path, elsewhere).devices.psd.error_maps[0] == "/opt/maps/1.json"
+    absolute = text.replace("maps/1.json", "/opt/maps/1.json")
+    assert loaded(tmp_path, absolute).devices.psd.error_maps[0] == "/opt/maps/1.json"
 
 
 def test_an_adapter_by_serial_number_and_further_words(tmp_path):
@@ -76,7 +76,7 @@ def test_an_adapter_by_serial_number_and_further_words(tmp_path):
         (PLAIN, ', "F.A"', "", "names 5 encoders, the arm has 6 joints"),
     ],
 )
-def test_a_mistake_is_told_with_its_remedy(tmp_path, text, old, new, says):
+def test_a_mistake_is_reported_with_its_remedy(tmp_path, text, old, new, says):
     assert old in text
     with pytest.raises(RigFileError) as refused:
         loaded(tmp_path, text.replace(old, new))

@@ -65,9 +65,9 @@ def refusal(old: str, new: str) -> str:
     ],
 )
 def test_millimetres_are_refused_with_what_to_write(old: str, new: str, line: int, key: str, metres: str) -> None:
-    told = refusal(old, new)
-    assert told.startswith(f"rig.toml line {line}: {key}")
-    assert f"probably in millimetres: divide by 1000 ({metres})" in told
+    lines = refusal(old, new)
+    assert lines.startswith(f"rig.toml line {line}: {key}")
+    assert f"probably in millimetres: divide by 1000 ({metres})" in lines
 
 
 def test_a_value_that_is_no_millimetres_either_is_asked_for_in_metres() -> None:

@@ -62,7 +62,7 @@ def test_an_arm_with_another_number_of_joints_cannot_be_asked_for(parse: Callabl
         parse(CSV).joints(6)
 
 
-def test_a_column_that_is_not_there_is_told_with_those_that_are(parse: Callable[[str], Samples]) -> None:
+def test_a_column_that_is_not_there_is_reported_with_those_that_are(parse: Callable[[str], Samples]) -> None:
     with pytest.raises(SamplesError, match="no numeric column 'wire_m' in the samples; there are t_s, q1_rad"):
         parse(CSV).column("wire_m")
 
@@ -104,7 +104,9 @@ def test_marks_of_spreadsheets_do_no_harm(parse: Callable[[str], Samples], rig: 
         ("t_s,", "time,", "column 't_s': the column is missing"),
     ],
 )  # fmt: skip
-def test_bad_input_is_told_with_row_and_column(parse: Callable[[str], Samples], old: str, new: str, says: str) -> None:
+def test_bad_input_is_reported_with_row_and_column(
+    parse: Callable[[str], Samples], old: str, new: str, says: str
+) -> None:
     assert old in CSV
     with pytest.raises(SamplesError) as refused:
         parse(CSV.replace(old, new, 1))
@@ -124,7 +126,7 @@ def test_what_is_no_table_is_refused(parse: Callable[[str], Samples], text: str,
         parse(text)
 
 
-def test_the_first_bad_row_is_the_one_that_is_told(parse: Callable[[str], Samples]) -> None:
+def test_the_first_bad_row_is_the_one_that_is_reported(parse: Callable[[str], Samples]) -> None:
     with pytest.raises(SamplesError, match=r"row 1 \(line 2\), column 'placement'"):
         parse(CSV.replace("0.1,0.2,1,2", "0.1,0.2,9,2").replace("2.5,-0.1", "2.5,"))
 

@@ -123,7 +123,7 @@ WIDE = {f"c{k}": pa.array([0.0]) for k in range(TABLE_COLUMNS + 1)}
 
 @pytest.mark.parametrize("read", [read_parquet, _sheet])
 @pytest.mark.parametrize(
-    ("columns", "told"),
+    ("columns", "lines"),
     [
         (EQUAL, r"6000000 cells up to here; at most 4000000 of a table are read, give a part of it"),
         (TEXTS, r"column 'note': a text of 100000 bytes; shorten it"),
@@ -135,11 +135,11 @@ WIDE = {f"c{k}": pa.array([0.0]) for k in range(TABLE_COLUMNS + 1)}
     ids=["rows", "texts", "large texts", "dictionary", "lists", "columns"],
 )
 def test_parquet_is_refused_by_what_its_directory_states(
-    columns: dict[str, Any], told: str, read: Callable[[Path, Rig], Any], rig: Rig, tmp_path: Path
+    columns: dict[str, Any], lines: str, read: Callable[[Path, Rig], Any], rig: Rig, tmp_path: Path
 ) -> None:
     path = _parquet(tmp_path / "a.parquet", **columns)
     assert path.stat().st_size < 1_500_000
-    with pytest.raises(SamplesError, match=rf"a\.parquet.*{told}"):
+    with pytest.raises(SamplesError, match=rf"a\.parquet.*{lines}"):
         read(path, rig)
 
 

@@ -213,18 +213,18 @@ def test_a_stop_that_cannot_be_delivered_is_kept_and_the_session_ends_all_the_sa
         control.checkpoint()
 
 
-def test_a_stop_that_cannot_be_delivered_is_told_once_and_so_is_the_one_that_is() -> None:
-    ways, told = [DeviceLost("robot: gone"), DeviceLost("robot: gone")], list[DeviceError | None]()
+def test_a_stop_that_cannot_be_delivered_is_reported_once_and_so_is_the_one_that_is() -> None:
+    ways, lines = [DeviceLost("robot: gone"), DeviceLost("robot: gone")], list[DeviceError | None]()
 
     def stop() -> None:
         if ways:
             raise ways.pop()
 
-    control = running(stop, undelivered=told.append)
+    control = running(stop, undelivered=lines.append)
     control.tell(RunEvent.BREAK)
     for _ in range(3):
         control.insist()
-    assert [str(trouble) for trouble in told] == ["robot: gone", "None"]
+    assert [str(trouble) for trouble in lines] == ["robot: gone", "None"]
 
 
 @pytest.mark.parametrize(
@@ -259,16 +259,16 @@ def test_an_abort_in_the_last_moment_is_no_success() -> None:
 
 @pytest.mark.parametrize(("left_s", "eases"), [(0.0, False), (0.9 * REST_S, False), (1.1 * REST_S, True), (10.0, True)])
 def test_a_pause_lets_a_short_motion_arrive_and_brakes_a_long_one_softly(clock, left_s, eases) -> None:
-    eased, told = threading.Event(), list[tuple[float, bool]]()
+    eased, lines = threading.Event(), list[tuple[float, bool]]()
     control = running(
         lambda: pytest.fail("a first pause is soft"),
         clock,
         rests_in_s=lambda: left_s,
         ease_arm=eased.set,
-        pausing=lambda rests_in_s, eased: told.append((rests_in_s, eased)),
+        pausing=lambda rests_in_s, eased: lines.append((rests_in_s, eased)),
     )
     control.interrupt()
-    assert told == [(left_s, eases)]
+    assert lines == [(left_s, eases)]
     assert eased.wait(10.0 if eases else 0.0) is eases
     if eases:
         with pytest.raises(BrokenOffError):

@@ -72,7 +72,7 @@ def test_a_motion_broken_off_is_made_again_and_no_pose_is_lost(rig, bench, at) -
     assert summary.skipped == 0
 
 
-def test_after_a_pause_every_joint_still_comes_from_the_side_that_is_told(rig, bench) -> None:
+def test_after_a_pause_every_joint_still_comes_from_the_side_that_is_reported(rig, bench) -> None:
     control = RunControl(bench.stop, changed=lambda state: control.resume() if state is RunState.PAUSED else None)
 
     class Watched(Kept):

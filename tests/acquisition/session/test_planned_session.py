@@ -59,7 +59,7 @@ def test_every_pose_is_taken_as_asked(rig, bench_of, plan):
         assert np.max(np.abs(sample.look.spots_m() - pose.spots_m)) < 1e-4
 
 
-def test_a_fixture_that_stands_elsewhere_is_found(rig, bench_of, plan):
+def test_a_fixture_that_stands_at_another_place_is_found(rig, bench_of, plan):
     """Moved by more than a face: every pose is dark, and its spots are brought near where they were expected."""
     bench = bench_of(6)
     moved = tuple(

@@ -149,7 +149,7 @@ def test_a_reading_begins_where_the_target_stands(clocked: bool) -> None:
     assert look.samples >= 20
 
 
-def test_a_clock_that_went_back_is_told() -> None:
+def test_a_clock_that_went_back_is_reported() -> None:
     device_s = np.concatenate([86390.0 + 0.01 * np.arange(10), 0.01 * np.arange(900)])
     with pytest.raises(DeviceStale, match="its time does not go on, or went back"):
         bench_of(Readings(device_s, ringing(910))).look(0.2)

@@ -78,7 +78,7 @@ def test_frames_wait_for_a_block_and_are_written_in_order(recorded) -> None:
     assert log.count == 100
 
 
-def test_long_frames_of_can_fd_stand_beside_the_others_and_cost_none_of_them(recorded) -> None:
+def test_long_frames_of_can_fd_stand_next_to_the_others_and_cost_none_of_them(recorded) -> None:
     log = FrameLog(recorded, Clock())
     for number in range(6):
         log.hear([frame(number)], False)
@@ -90,7 +90,7 @@ def test_long_frames_of_can_fd_stand_beside_the_others_and_cost_none_of_them(rec
     assert log.count == 12
 
 
-def test_a_recording_that_failed_is_told_by_flush_and_not_to_the_bus(recorded) -> None:
+def test_a_recording_that_failed_is_reported_by_flush_and_not_to_the_bus(recorded) -> None:
     clock = Clock()
     log = FrameLog(recorded, clock)
 

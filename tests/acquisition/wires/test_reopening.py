@@ -49,7 +49,7 @@ class Scripted:
         self.closed += 1
 
 
-class Told:
+class Listener:
     def __init__(self) -> None:
         self.lost: list[str] = []
         self.back: list[tuple[float, float]] = []
@@ -68,37 +68,37 @@ class Told:
 
 
 @pytest.mark.parametrize("why", [DeviceLost("unplugged"), DeviceStale("silent"), DeviceRefused("stopped by another")])
-def test_a_lost_device_is_attached_again_and_the_stretch_told(why: DeviceError) -> None:
-    told = Told()
-    device = told.attach(Scripted([1, why, 2], [None, DeviceLost("still away"), DeviceStale("still away"), None]))
+def test_a_lost_device_is_attached_again_and_the_stretch_reported(why: DeviceError) -> None:
+    listener = Listener()
+    device = listener.attach(Scripted([1, why, 2], [None, DeviceLost("still away"), DeviceStale("still away"), None]))
     assert device.read(0.1).sequence.tolist() == [1]
     assert device.read(0.1).sequence.tolist() == [2]
-    assert told.lost == [str(why)]
-    ((from_s, to_s),) = told.back
+    assert listener.lost == [str(why)]
+    ((from_s, to_s),) = listener.back
     assert to_s >= from_s
 
 
 def test_at_the_start_it_must_be_there() -> None:
     with pytest.raises(DeviceLost, match="no adapter"):
-        Told().attach(Scripted([], [DeviceLost("no adapter")]))
+        Listener().attach(Scripted([], [DeviceLost("no adapter")]))
 
 
 def test_another_device_in_its_place_is_refused() -> None:
-    device = Told().attach(Scripted([DeviceLost("unplugged")], [None, Channel("position_rad", "rad", (3,))]))
+    device = Listener().attach(Scripted([DeviceLost("unplugged")], [None, Channel("position_rad", "rad", (3,))]))
     with pytest.raises(DeviceRefused, match="came back as another device"):
         device.read(0.1)
 
 
 def test_another_one_of_the_same_type_is_refused() -> None:
-    device = Told().attach(Scripted([DeviceLost("unplugged")], ["number 17", "number 18"]))
+    device = Listener().attach(Scripted([DeviceLost("unplugged")], ["number 17", "number 18"]))
     with pytest.raises(DeviceRefused, match="another device, number 18 instead of number 17"):
         device.read(0.1)
 
 
 def test_who_gives_up_gets_what_it_was_lost_by() -> None:
-    told = Told()
+    listener = Listener()
     scripted = Scripted([DeviceLost("unplugged")], [None, *[DeviceLost("away")] * 1_000_000])
-    device = told.attach(scripted)
+    device = listener.attach(scripted)
     scripted.tried.clear()
     raised: list[Exception] = []
 
@@ -114,13 +114,13 @@ def test_who_gives_up_gets_what_it_was_lost_by() -> None:
     device.give_up()
     thread.join(10.0)
     assert [str(error) for error in raised] == ["unplugged"]
-    assert told.back == []
+    assert listener.back == []
 
 
 def test_a_device_that_is_being_closed_is_not_attached_again() -> None:
-    told = Told()
-    device = told.attach(Scripted([DeviceLost("closed under the reader")]))
+    listener = Listener()
+    device = listener.attach(Scripted([DeviceLost("closed under the reader")]))
     device.close()
     with pytest.raises(DeviceLost, match="closed under the reader"):
         device.read(0.1)
-    assert told.lost == []
+    assert listener.lost == []

@@ -47,15 +47,15 @@ class Scripted:
 @pytest.fixture
 def running():
     device, kept, failures = Scripted(), [], []
-    told = threading.Event()
+    released = threading.Event()
 
     def failed(failure: Exception) -> None:
         failures.append(failure)
-        told.set()
+        released.set()
 
     pump = Pump(device, SystemClock(), kept.append, failed, stale_s=0.1)
     pump.start()
-    yield device, pump, kept, failures, told
+    yield device, pump, kept, failures, released
     device.closed.set()
     pump.stop()
 
@@ -71,11 +71,11 @@ def test_blocks_go_to_the_sink_and_into_the_memory(running) -> None:
     assert [b.host_s[0] for b in kept] == [1.0, 2.0, 3.0]
 
 
-def test_a_failing_device_is_told_at_once_and_raised_to_who_waits(running) -> None:
-    device, pump, _, failures, told = running
+def test_a_failing_device_is_reported_at_once_and_raised_to_who_waits(running) -> None:
+    device, pump, _, failures, released = running
     device.fails = DeviceLost("psd: unplugged")
     device.allowed.release()
-    assert told.wait(2.0)
+    assert released.wait(2.0)
     assert str(failures[0]) == "psd: unplugged"
     with pytest.raises(DeviceLost, match="unplugged"):
         pump.wait(0.0, timeout_s=1.0)
@@ -98,19 +98,19 @@ def test_a_stopped_pump_reports_no_failure_and_closes_its_device(running) -> Non
 
 
 def test_a_sink_that_cannot_write_stops_the_stream() -> None:
-    device, failures, told = Scripted(), [], threading.Event()
+    device, failures, released = Scripted(), [], threading.Event()
 
     def full(_: Block) -> None:
         raise OSError("disk full")
 
     def failed(failure: Exception) -> None:
         failures.append(failure)
-        told.set()
+        released.set()
 
     pump = Pump(device, SystemClock(), full, failed)
     pump.start()
     device.allowed.release()
-    assert told.wait(2.0)
+    assert released.wait(2.0)
     assert str(failures[0]) == "disk full"
     device.closed.set()
     pump.stop()

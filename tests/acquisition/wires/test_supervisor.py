@@ -59,7 +59,7 @@ def test_a_person_holds_the_arm_whatever_was_before() -> None:
     assert held == [1, 1]
 
 
-def test_a_stop_that_cannot_be_delivered_is_told_and_ends_the_session_all_the_same() -> None:
+def test_a_stop_that_cannot_be_delivered_is_reported_and_ends_the_session_all_the_same() -> None:
     def refuse() -> None:
         raise DeviceLost("no way to the controller")
 
@@ -125,7 +125,7 @@ class Raising:
 
 
 @pytest.mark.parametrize(
-    ("raised", "told"),
+    ("raised", "kind"),
     [
         (OSError(5, "Input/output error"), DeviceLost),
         (ConnectionResetError("reset"), DeviceLost),
@@ -136,12 +136,12 @@ class Raising:
         (WireError("junk"), WireError),
     ],
 )
-def test_whatever_a_library_raises_is_one_of_ours(raised, told) -> None:
+def test_whatever_a_library_raises_is_one_of_ours(raised, kind) -> None:
     device = Guarded(Raising(raised))
     for act in (device.connect, lambda: device.read(1.0), device.close):
         with pytest.raises(DeviceError) as caught:
             act()
-        assert type(caught.value) is told
+        assert type(caught.value) is kind
         assert caught.value is raised or caught.value.__cause__ is raised
 
 

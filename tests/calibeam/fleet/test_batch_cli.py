@@ -69,7 +69,7 @@ def test_a_recording_becomes_its_row(out):
     assert "no settled sample is left" in torn.error
 
 
-def test_what_stands_is_told_again_with_what_failed(fleet, out, capsys):
+def test_what_stands_is_reported_again_with_what_failed(fleet, out, capsys):
     assert run(["batch", str(fleet), "--out", str(out), "--jobs", "1", "--json"]) == 3
     said = json.loads(capsys.readouterr().out)
     assert (said["recordings"], said["identified"], said["stood"], said["robots"]) == (3, 2, 3, ["A-1"])
@@ -89,8 +89,8 @@ def test_what_is_no_recording_fails_in_words(tmp_path):
 def test_a_zero_comes_with_what_the_rig_file_draws():
     first = ModelParameter("joint1.zero", "rad", None, None, "why")
     second = ModelParameter("joint2.zero", "rad", 1e-3, 1e-5, None)
-    told = _zeros(SimpleNamespace(parameters=(first, second)), load_rig(RIG))
-    assert told == (Zero(1, None, None, "why", 0.0), Zero(2, 1e-3, 1e-5, "determined", -math.pi / 2.0))
+    lines = _zeros(SimpleNamespace(parameters=(first, second)), load_rig(RIG))
+    assert lines == (Zero(1, None, None, "why", 0.0), Zero(2, 1e-3, 1e-5, "determined", -math.pi / 2.0))
 
 
 def test_a_stopped_run_says_how_to_go_on():

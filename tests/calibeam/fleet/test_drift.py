@@ -57,9 +57,9 @@ def test_scatter_beyond_the_stated_sigma_widens_the_interval():
 
 def test_what_all_zeros_scatter_is_what_their_sigmas_are_worth():
     rng, year = np.random.default_rng(3), np.arange(4.0)
-    for scatter, told in ((3.0, 3.0), (0.3, 1.0)):
+    for scatter, expected in ((3.0, 3.0), (0.3, 1.0)):
         fleet = [series(year, year * 1e-3 + scatter * SIGMA * rng.standard_normal(4)) for _ in range(200)]
-        assert common_scatter(fleet) == pytest.approx(told, rel=0.15)
+        assert common_scatter(fleet) == pytest.approx(expected, rel=0.15)
     assert common_scatter([]) == 1.0
 
 
@@ -90,10 +90,10 @@ def test_two_dates_copies_and_numbers_of_no_trust_are_no_series():
     rows = [row("r", day, 0.0) for day in ("2025-01-01", "2026-01-01")]
     assert find_drifts(rows).lines == ()
     copy = row("r", "2026-06-01", 0.0, sha256=rows[0].sha256)
-    doubtful = row("r", "2026-07-01", 1.0, trust="no")
+    untrusted = row("r", "2026-07-01", 1.0, trust="no")
     undated = row("r", "", 1.0)
-    assert find_drifts([*rows, copy, doubtful, undated]).lines == ()
-    assert [len(s.year) for s in all_series([*rows, copy, doubtful, undated])] == [2]
+    assert find_drifts([*rows, copy, untrusted, undated]).lines == ()
+    assert [len(s.year) for s in all_series([*rows, copy, untrusted, undated])] == [2]
 
 
 def test_a_zero_that_was_written_into_the_rig_file_is_no_step():

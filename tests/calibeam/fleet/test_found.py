@@ -20,7 +20,7 @@ def test_results_and_hidden_folders_are_left_out(folder):
     assert names(root, root / "out") == ["a.mcap"]
 
 
-def test_a_folder_without_recordings_is_told(folder, tmp_path):
+def test_a_folder_without_recordings_is_reported(folder, tmp_path):
     with pytest.raises(DataError, match="no recording"):
         find_recordings(folder("notes.txt"), tmp_path)
     with pytest.raises(DataError, match="no such folder"):
@@ -54,7 +54,7 @@ def test_the_parts_of_a_session_are_one_recording(folder):
     assert content_sha256(whole.path) != before
 
 
-def test_content_is_told_by_content_alone(folder):
+def test_content_is_recognised_by_content_alone(folder):
     root = folder("a.mcap", "b.mcap", "c/rig.toml", "c/samples.csv")
     (root / "b.mcap").write_text("a.mcap")
     assert content_sha256(root / "a.mcap") == content_sha256(root / "b.mcap")

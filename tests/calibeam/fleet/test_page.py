@@ -59,8 +59,8 @@ def test_the_page_names_the_robot_that_drifts_the_cause_that_is_shared_and_the_f
 
 
 def test_two_recordings_of_one_day_are_one_date(fleet):
-    told = fleet.drifting[0].series
-    again = session(told.robot, DAYS[0], 0.0)
+    drifting = fleet.drifting[0].series
+    again = session(drifting.robot, DAYS[0], 0.0)
     rows = (*fleet.rows, msgspec.structs.replace(again, path="/again", name="again", sha256="again"))
     twice = Fleet(rows)
     assert fleet_record(RunResult(rows, 0, 0, 0, stopped=False), twice, "", "")["drifts"][0]["dates"] == len(DAYS)

@@ -42,9 +42,9 @@ def test_only_new_changed_and_lost_ones_are_done_again(ran, folder):
     (root / "b.mcap").write_text("another content")
     (root / "gone.mcap").unlink()
     folder("new.mcap")
-    told = []
-    done = ran(root, lambda done, total, name: told.append(name))
-    assert sorted(told) == ["", "b.mcap", "exits.mcap", "new.mcap"]
+    names = []
+    done = ran(root, lambda done, total, name: names.append(name))
+    assert sorted(names) == ["", "b.mcap", "exits.mcap", "new.mcap"]
     assert (done.stood, done.kept) == (2, 1)
 
 

@@ -46,7 +46,7 @@ def test_a_process_that_is_lost_becomes_a_row_and_the_next_recording_is_read(ask
     assert after.outcome is Outcome.IDENTIFIED
 
 
-def test_a_program_that_does_not_start_is_told(folder, tmp_path):
+def test_a_program_that_does_not_start_is_reported(folder, tmp_path):
     (one,) = find_recordings(folder("a.mcap"), tmp_path)
     order = Order(Task.of(one, diagnose=False), None, (str(tmp_path / "none"),))
     child = Child(order.command)

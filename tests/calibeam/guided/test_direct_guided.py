@@ -11,7 +11,7 @@ from acquisition.guided.session import GuidedSession, GuidedSummary
 from acquisition.recording.rig import load_rig, plain_rig, rig_sha256, rig_text
 from benchmarks.direct_hand import DirectHand
 from calibeam.guided.judge import FittedJudge, samples_of
-from calibeam.guided.recorded import BelievedGuidedArm
+from calibeam.guided.recorded import AssumedGuidedArm
 from calibrate.fit.identify.identify import identify
 from calibrate.fit.identify.record import record_of
 from calibrate.fit.solvers import Status
@@ -41,7 +41,7 @@ def world(seed: int, **emulation: float) -> HandWorld:
 def session(hand: DirectHand, plan) -> tuple[GuidedSummary, Journal]:
     journal = Journal()
     made = GuidedSession(
-        hand, BelievedGuidedArm.of_rig(RIG), hand, FittedJudge(RIG), journal, np.random.default_rng(1), patience_s=30.0
+        hand, AssumedGuidedArm.of_rig(RIG), hand, FittedJudge(RIG), journal, np.random.default_rng(1), patience_s=30.0
     )
     return made.run(plan), journal
 
@@ -100,18 +100,18 @@ def test_the_arm_is_identified_to_micrometres_and_its_discs_with_it(taken) -> No
     true = made.arm.tip_m(shafts)
     spans = np.linalg.norm(tips[:, None] - tips[None], axis=2) - np.linalg.norm(true[:, None] - true[None], axis=2)
     assert np.sqrt(np.mean(spans**2)) < 15e-6
-    drawn = BelievedGuidedArm.of_rig(RIG).tip_m(shafts)
+    drawn = AssumedGuidedArm.of_rig(RIG).tip_m(shafts)
     before = np.linalg.norm(drawn[:, None] - drawn[None], axis=2) - np.linalg.norm(true[:, None] - true[None], axis=2)
     assert np.sqrt(np.mean(before**2)) > 200e-6
     sizes = {p.name: p for p in found.estimates if "disc" in p.name}
     disc = made.truth.discs[2]
-    told = sizes["joint3.disc_sine"]
-    assert told.value is not None
+    estimate = sizes["joint3.disc_sine"]
+    assert estimate.value is not None
     expected = disc.eccentricity_m / 0.02 * np.cos(disc.bearing_rad)
-    assert abs(told.value - expected) < 5.0 * told.sigma + 3e-6
+    assert abs(estimate.value - expected) < 5.0 * estimate.sigma + 3e-6
 
 
-def test_cones_alone_say_that_the_size_of_the_arm_is_only_believed(taken) -> None:
+def test_cones_alone_say_that_the_size_of_the_arm_is_only_assumed(taken) -> None:
     """All lengths times a factor satisfy every cone: without a length the drawing alone holds the scale."""
     _, summary, _ = taken
     cones = tuple(one for one in summary.readings if isinstance(one.target, Cone))
@@ -119,31 +119,31 @@ def test_cones_alone_say_that_the_size_of_the_arm_is_only_believed(taken) -> Non
     assert any("cones alone determine no length" in alarm for alarm in found.alarms)
 
 
-def test_a_reading_off_its_cone_is_doubted_once_the_arm_is_known(taken, judge) -> None:
+def test_a_reading_off_its_cone_is_uncertain_once_the_arm_is_known(taken, judge) -> None:
     _, summary, _ = taken
     last = [one for one in summary.readings if isinstance(one.target, Cone)][-1]
-    assert judge.doubt([last]) is None
+    assert judge.off_target([last]) is None
     pushed = reading(np.add(last.q_rad, [0, 5e-4, 0, 0, 0, 0]), last.target)
-    assert judge.doubt([pushed]).miss_m > 1e-4
+    assert judge.off_target([pushed]).miss_m > 1e-4
     assert judge.repeatability_m < 20e-6
 
 
-def test_a_bar_of_another_length_is_doubted(taken, judge) -> None:
+def test_a_bar_of_another_length_is_uncertain(taken, judge) -> None:
     _, summary, _ = taken
     ends = [one for one in summary.readings if isinstance(one.target, BarEnd)][:2]
-    assert judge.doubt(ends) is None
+    assert judge.off_target(ends) is None
     longer = reading(np.add(ends[1].q_rad, [5e-4, 0, 0, 0, 0, 0]), ends[1].target)
-    assert judge.doubt([ends[0], longer]) is not None
+    assert judge.off_target([ends[0], longer]) is not None
 
 
-def test_before_anything_is_known_nothing_is_doubted() -> None:
+def test_before_anything_is_known_nothing_is_uncertain() -> None:
     judge = FittedJudge(RIG)
-    assert judge.doubt([reading([0.1] * 6)]) is None
+    assert judge.off_target([reading([0.1] * 6)]) is None
     assert judge.repeatability_m is None
 
 
-def test_postures_bring_the_believed_probe_there_within_the_ranges() -> None:
-    arm = BelievedGuidedArm.of_rig(RIG)
+def test_postures_bring_the_assumed_probe_there_within_the_ranges() -> None:
+    arm = AssumedGuidedArm.of_rig(RIG)
     starts = np.random.default_rng(1).uniform(arm.lower_rad, arm.upper_rad, (60, 6))
     found = arm.postures(starts, np.array([0.5, 0.1, 0.2]))
     assert len(found) > 10

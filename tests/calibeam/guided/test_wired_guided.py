@@ -16,7 +16,7 @@ from acquisition.guided.session import GuidedSummary
 from acquisition.recording import RecordingWriter, read
 from acquisition.recording.rig import load_rig, rig_text
 from calibeam.emulation import Emulation
-from calibeam.guided.recorded import BelievedGuidedArm, encoder_address, record_guided, watching
+from calibeam.guided.recorded import AssumedGuidedArm, encoder_address, record_guided, watching
 from calibeam.guided.run import EmulatedHand, PersonGuide
 from calibeam.outcome import PartialResult
 from drivers.clock import SystemClock
@@ -81,7 +81,7 @@ def test_a_whole_session_is_in_the_recording(takes: Takes, tmp_path: Path) -> No
     # The arm of this seed is off by millimetres, and so are the cones; a probe in the air would be off by far more.
     written = msgspec.json.decode((tmp_path / "truth.json").read_bytes(), type=HandTruth)
     truth = {seat.id: seat.origin_m for seat in written.seats}
-    tips = BelievedGuidedArm.of_rig(RIG).tip_m(recording.samples.joints()[:6])
+    tips = AssumedGuidedArm.of_rig(RIG).tip_m(recording.samples.joints()[:6])
     apart = np.linalg.norm(tips - [truth[k] for k in (1, 1, 1, 2, 2, 2)], axis=1)
     assert apart.max() < 8e-3
 

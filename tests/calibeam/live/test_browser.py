@@ -219,7 +219,7 @@ def test_a_phone_has_all_of_it_without_scrolling_sideways(browser: Browser, livi
         expect(page.locator("#stop")).to_be_in_viewport(ratio=1.0)
 
 
-def test_a_stop_that_failed_stays_told_until_one_came_after_it(browser: Browser, living: LivingRig) -> None:
+def test_a_stop_that_failed_stays_reported_until_one_came_after_it(browser: Browser, living: LivingRig) -> None:
     assert isinstance(living.feed, Latest)
     living.feed.stops_by(lambda: None)
     before = living.feed.stop.press("another page")

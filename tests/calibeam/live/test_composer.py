@@ -22,21 +22,21 @@ def composer(rig, latest) -> Composer:
     return Composer(rig, latest, "session")
 
 
-def told(text: str) -> dict:
+def decoded(text: str) -> dict:
     return msgspec.json.decode(text)
 
 
-def test_the_rig_is_told_once(composer, rig) -> None:
-    says = told(composer.rig())
+def test_the_rig_is_reported_once(composer, rig) -> None:
+    says = decoded(composer.rig())
     assert (says["kind"], says["name"], says["job"]) == ("rig", rig.name, "session")
     assert says["half_m"] == rig.fixture.half_size_m
     assert 1.0 < says["reach_m"] < 1.5
 
 
 def test_before_anything_is_heard_nothing_is_made_up(composer) -> None:
-    now = told(composer.now())
+    now = decoded(composer.now())
     assert (now["faces"], now["q_rad"], now["points_m"], now["beam"]) == (None, None, None, None)
-    state = told(composer.state())
+    state = decoded(composer.state())
     assert {device["state"] for device in state["devices"]} == {"waiting"}
     assert state["stop"]["ready"] is False
 
@@ -44,8 +44,8 @@ def test_before_anything_is_heard_nothing_is_made_up(composer) -> None:
 def test_spots_and_beam_are_those_of_light_and_model(composer, living, rig, latest) -> None:
     latest.stands(1, 1)
     living.send(0.0)
-    told(composer.state())
-    now = told(composer.now())
+    decoded(composer.state())
+    now = decoded(composer.now())
     expected = AssumedRig(rig).expect(living.posture(0.0), 1, 1).spots_m
     shown = [now["faces"][k][name] for k in (0, 1) for name in ("x_m", "y_m")]
     assert shown == pytest.approx(expected + np.array([6e-4, -4e-4, -3e-4, 8e-4]), abs=2e-6)
@@ -59,8 +59,8 @@ def test_spots_and_beam_are_those_of_light_and_model(composer, living, rig, late
 def test_the_beam_goes_from_the_laser_over_one_face_to_the_other(composer, living, rig, latest) -> None:
     latest.stands(1, 1)
     living.send(0.0)
-    told(composer.state())
-    laser, first, second = (np.array(point) for point in told(composer.now())["beam"]["points_m"])
+    decoded(composer.state())
+    laser, first, second = (np.array(point) for point in decoded(composer.now())["beam"]["points_m"])
     origin_m, direction = AssumedRig(rig).beam(living.posture(0.0))
     assert laser == pytest.approx(origin_m, abs=2e-5)
     assert np.cross(first - laser, direction) == pytest.approx(0.0, abs=5e-5)
@@ -73,28 +73,28 @@ def test_the_beam_goes_from_the_laser_over_one_face_to_the_other(composer, livin
 def test_a_face_in_the_dark_says_so(composer, living) -> None:
     living.dark = {2}
     living.send(0.0)
-    one, two = told(composer.now())["faces"]
+    one, two = decoded(composer.now())["faces"]
     assert (one["state"], two["state"], two["x_m"]) == ("light", "no light", None)
 
 
 def test_a_saturated_face_says_so(composer, living) -> None:
     living.bright = {1}
     living.send(0.0)
-    assert told(composer.now())["faces"][0]["state"] == "saturated"
+    assert decoded(composer.now())["faces"][0]["state"] == "saturated"
 
 
 def test_old_samples_are_not_shown(composer, living, clock) -> None:
     living.send(0.0)
     clock.time_s += 1.0
-    now = told(composer.now())
+    now = decoded(composer.now())
     assert (now["faces"], now["q_rad"], now["points_m"]) == (None, None, None)
-    assert {device["state"] for device in told(composer.state())["devices"]} == {"stale"}
+    assert {device["state"] for device in decoded(composer.state())["devices"]} == {"stale"}
 
 
 def test_without_the_controller_the_encoders_tell_the_joints(composer, living) -> None:
     living.silent = {"robot"}
     living.send(0.0)
-    now = told(composer.now())
+    now = decoded(composer.now())
     assert now["by"] == "encoders"
     assert now["q_rad"] == pytest.approx(living.posture(0.0), abs=1e-4)
 
@@ -102,25 +102,25 @@ def test_without_the_controller_the_encoders_tell_the_joints(composer, living) -
 def test_a_joint_that_does_not_answer_is_none_and_no_robot_is_drawn(composer, latest, clock) -> None:
     values = {"position_rad": np.array([[0.1, np.nan, 0.3, 0.4, 0.5, 0.6]])}
     latest.heard("encoders", Block(np.array([clock.now_s()]), np.array([1.0]), np.array([1]), values))
-    now = told(composer.now())
+    now = decoded(composer.now())
     assert now["q_rad"] == [0.1, None, 0.3, 0.4, 0.5, 0.6]
     assert now["points_m"] is None
 
 
 def test_where_the_fixture_stands_is_guessed_when_nobody_says(composer, living) -> None:
     living.send(0.0)
-    standing = told(composer.state())["standing"]
+    standing = decoded(composer.state())["standing"]
     assert (standing["placement"], standing["first_psd"], standing["told"]) == (1, 1, False)
 
 
 def test_a_fitted_model_moves_the_beam(composer, living, latest) -> None:
     latest.stands(1, 1)
     living.send(0.0)
-    told(composer.state())
-    before = told(composer.now())["beam"]["spots_m"]
+    decoded(composer.state())
+    before = decoded(composer.now())["beam"]["spots_m"]
     latest.believes({"joint1.zero": 5e-3})
-    told(composer.state())
-    after = told(composer.now())["beam"]["spots_m"]
+    decoded(composer.state())
+    after = decoded(composer.now())["beam"]["spots_m"]
     assert np.max(np.abs(np.subtract(after, before))) > 1e-3
 
 
@@ -128,7 +128,7 @@ def test_a_place_that_the_rig_file_does_not_have_is_no_trouble(composer, living,
     latest.stands(9, 1)
     latest.believes({"placement9.x": 1e-3, "joint1.zero": 1e-3})
     living.send(0.0)
-    assert told(composer.state())["standing"]["placement"] == 1
+    assert decoded(composer.state())["standing"]["placement"] == 1
 
 
 def test_a_place_that_the_session_added_is_drawn_where_it_is(composer, living, rig, latest) -> None:
@@ -136,7 +136,7 @@ def test_a_place_that_the_session_added_is_drawn_where_it_is(composer, living, r
     latest.measures(structs.replace(rig, placement_list=(*rig.placement_list, added)))
     latest.stands(9, 1)
     living.send(0.0)
-    standing = told(composer.state())["standing"]
+    standing = decoded(composer.state())["standing"]
     assert (standing["placement"], standing["told"]) == (9, True)
     assert np.mean(standing["corners_m"][0], axis=0) == pytest.approx((0.3, -0.2, 0.1), abs=1e-4)
 
@@ -145,7 +145,7 @@ def test_progress_and_log_come_with_their_ages(composer, latest, clock) -> None:
     latest.progress(Progress("collecting", 3, 40, 120.0, "too early to tell"))
     latest.said("place 1: light found")
     clock.time_s += 2.0
-    state = told(composer.state())
+    state = decoded(composer.state())
     assert state["progress"] == {
         "phase": "collecting",
         "done": 3,
@@ -156,11 +156,11 @@ def test_progress_and_log_come_with_their_ages(composer, latest, clock) -> None:
     assert state["lines"] == [{"number": 1, "age_s": 2.0, "text": "place 1: light found"}]
 
 
-def test_a_stop_is_told_to_every_page(composer, latest, clock) -> None:
+def test_a_stop_is_asked_to_every_page(composer, latest, clock) -> None:
     latest.stops_by(lambda: None)
     latest.stop.press("the page at 127.0.0.1")
     clock.time_s += 3.0
-    stop = told(composer.state())["stop"]
+    stop = decoded(composer.state())["stop"]
     assert (stop["ready"], stop["delivered"], stop["age_s"]) == (True, True, 3.0)
     assert stop["who"] == "the page at 127.0.0.1"
 
@@ -171,7 +171,7 @@ def test_a_measuring_arm_has_no_beam(clock) -> None:
     composer = Composer(rig, latest, "watch")
     q_rad = np.full((1, rig.n_joints), 0.1)
     latest.heard("encoders", Block(np.array([clock.now_s()]), np.array([1.0]), np.array([1]), {"position_rad": q_rad}))
-    told(composer.state())
-    now = told(composer.now())
+    decoded(composer.state())
+    now = decoded(composer.now())
     assert len(now["points_m"]) == rig.n_joints + 1
     assert now["beam"] is None

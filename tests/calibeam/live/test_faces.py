@@ -38,7 +38,7 @@ def test_light_beyond_the_error_map_is_light_without_a_spot() -> None:
     assert measured_m((one, other)) is None
 
 
-def test_dark_and_too_bright_faces_are_told_apart() -> None:
+def test_dark_and_too_bright_faces_are_distinguished() -> None:
     flags = Flag.PSD1_NO_LIGHT | Flag.PSD2_SATURATED
     one, other = faces_now(PsdView(FACES, 1e5), block(9.0, 12.0, 11.0, 10.0, flags=flags))
     assert (one.state, one.x_m) == ("no light", None)

@@ -31,7 +31,7 @@ def test_a_live_device_tells_age_and_rate_by_its_own_clock(watch, latest, block,
     assert health.says == ""
 
 
-def test_samples_that_go_missing_are_counted_and_told(watch, latest, block, clock) -> None:
+def test_samples_that_go_missing_are_counted_and_reported(watch, latest, block, clock) -> None:
     for first in range(0, 300, 10):
         latest.heard("encoders", block(*range(first, first + 5)))
         health = watch.look("encoders", latest.of("encoders"), clock.now_s())

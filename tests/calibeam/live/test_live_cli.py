@@ -36,7 +36,7 @@ def test_it_prints_where_the_page_is_and_ends(text: str, tmp_path: Path, capsys:
     assert json.loads(capsys.readouterr().out)["url"].startswith("http://127.0.0.1:")
 
 
-def test_a_rig_without_devices_is_told(text: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_rig_without_devices_is_reported(text: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     rig = rig_without(text, tmp_path, "devices.robot", "devices.psd", "devices.encoders")
     assert run(["live", str(rig), "--port", "0", "--for-s", "0"]) == 1
     assert "no [devices]" in capsys.readouterr().err

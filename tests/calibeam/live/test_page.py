@@ -63,7 +63,7 @@ def test_off_loopback_a_token_is_made_at_random(rig, monkeypatch: pytest.MonkeyP
     assert tokens[0] != tokens[1]
 
 
-def test_a_port_that_is_taken_is_told_and_free_again_afterwards(rig, own_address) -> None:
+def test_a_port_that_is_taken_is_reported_and_free_again_afterwards(rig, own_address) -> None:
     with live_page(rig, SystemClock(), own_address) as page:
         port = int(page.url.rpartition(":")[2].strip("/"))
         with (
@@ -75,12 +75,12 @@ def test_a_port_that_is_taken_is_told_and_free_again_afterwards(rig, own_address
         pass
 
 
-def test_an_address_of_another_machine_is_told(rig) -> None:
+def test_an_address_of_another_machine_is_reported(rig) -> None:
     with pytest.raises(PageError, match="live page"), live_page(rig, SystemClock(), PageAddress("192.0.2.1", 0)):
         pass
 
 
-def test_a_picture_that_cannot_be_made_is_told_and_the_beat_goes_on(rig) -> None:
+def test_a_picture_that_cannot_be_made_is_reported_and_the_beat_goes_on(rig) -> None:
     class BrokenError(Exception):
         pass
 

@@ -12,7 +12,7 @@ from calibeam.live.stopping import Viewer, Viewers
 
 
 @pytest.mark.parametrize(("broken", "whole"), [("state", "now"), ("now", "state")])
-def test_one_kind_that_fails_is_told_and_the_other_goes_on(rig, latest, clock, monkeypatch, broken, whole) -> None:
+def test_one_kind_that_fails_is_reported_and_the_other_goes_on(rig, latest, clock, monkeypatch, broken, whole) -> None:
     composer = Composer(rig, latest, "session")
 
     def fail() -> str:
@@ -24,13 +24,13 @@ def test_one_kind_that_fails_is_told_and_the_other_goes_on(rig, latest, clock, m
         viewers, viewer = Viewers(clock), Viewer()
         viewers.add(viewer)
         beat = asyncio.create_task(Pulse(viewers, composer).run())
-        told = [msgspec.json.decode(await viewer.next()) for _ in range(2)]
+        messages = [msgspec.json.decode(await viewer.next()) for _ in range(2)]
         beat.cancel()
         with suppress(asyncio.CancelledError):
             await beat
-        return told
+        return messages
 
-    told = {message["kind"]: message for message in asyncio.run(look())}
-    assert set(told) == {"trouble", whole}
-    assert told["trouble"]["of"] == broken
-    assert "no faces" in told["trouble"]["says"]
+    messages = {message["kind"]: message for message in asyncio.run(look())}
+    assert set(messages) == {"trouble", whole}
+    assert messages["trouble"]["of"] == broken
+    assert "no faces" in messages["trouble"]["says"]

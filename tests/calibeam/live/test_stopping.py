@@ -30,7 +30,7 @@ def test_an_arm_is_stopped_as_often_as_it_is_pressed(stop) -> None:
     assert stop.last.delivered
 
 
-def test_an_arm_that_does_not_take_it_is_told_loudly(stop) -> None:
+def test_an_arm_that_does_not_take_it_is_reported_loudly(stop) -> None:
     def refuse() -> None:
         raise DeviceLost("robot: no way to the controller")
 

@@ -35,7 +35,7 @@ def test_the_cell_of_the_rig_file_leaves_its_session_free_and_it_is_drawn(rig: R
     assert "station 3" in text
 
 
-def test_a_box_at_one_place_is_told_with_the_first_pose_that_it_costs(rig: Rig) -> None:
+def test_a_box_at_one_place_is_reported_with_the_first_pose_that_it_costs(rig: Rig) -> None:
     x, y, z = rig.placements[2].psd1_in_base.origin_m
     rehearsed = rehearse(boxed(rig, (x - 0.2, y - 0.2, z - 0.2), (x + 0.2, y + 0.2, z + 0.2)), FEW)
     assert rehearsed.refused

@@ -47,8 +47,8 @@ def run_in_turn(server: Server, good: Path, pair: Pair, seeds: range, folder: Pa
     for seed, own in zip(seeds, folders, strict=True):
         lay_out(good, pair, range(seed, seed + 1), own)
     runs = server.run_in_turn(pair.words.split(), folders, LIMIT_S, LIMIT_BYTES)
-    doubted = [seed for k, seed in enumerate(seeds) if k >= len(runs) or faults(pair, seed, runs[k])]
-    again = [run_case(server, good, pair, range(seed, seed + 1), folder / f"again-{seed}") for seed in doubted]
+    suspect = [seed for k, seed in enumerate(seeds) if k >= len(runs) or faults(pair, seed, runs[k])]
+    again = [run_case(server, good, pair, range(seed, seed + 1), folder / f"again-{seed}") for seed in suspect]
     return [fault for _, found in again for fault in found]
 
 

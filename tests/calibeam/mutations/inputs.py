@@ -29,7 +29,7 @@ from calibeam.fleet.recordings import find_recordings
 from calibeam.fleet.row import Task
 from calibeam.fleet.table import write_rows
 from calibeam.fleet.worker import judge_recording
-from calibeam.guided.recorded import BelievedGuidedArm
+from calibeam.guided.recorded import AssumedGuidedArm
 from calibrate.model.arms.catalogue import arm_of
 from calibrate.model.arms.eccentric import with_discs
 from calibrate.model.model_file import ModelFile, RigIdentity, write_model
@@ -198,7 +198,7 @@ def _guided(folder: Path) -> None:
     """A verification of the measuring arm, and its model, which is the arm as drawn."""
     source = RIGS / "arm-cmm-reference.toml"
     rig, rng = load_rig(source), np.random.default_rng(1)
-    arm = BelievedGuidedArm.of_rig(rig)
+    arm = AssumedGuidedArm.of_rig(rig)
 
     def posture(point_m: tuple[float, ...]) -> Floats:
         return arm.postures(rng.uniform(arm.lower_rad, arm.upper_rad, (200, 6)), np.array(point_m))[0]
@@ -321,7 +321,7 @@ def _camera() -> dict[str, Any]:
 
 
 def _frames() -> list[can.Message]:
-    """Frames of anybody's, and those of the encoders as encoders.dbc has them, in order of time."""
+    """Frames of anybody's, and those of the encoders.dbc has them, in order of time."""
     rng = np.random.default_rng(4)
     angles = [
         can.Message(

@@ -180,19 +180,19 @@ def test_a_fork_ends_as_the_console_script_does(
     assert done.stdout.splitlines()[:1] == forked.out.splitlines()[:1]
 
 
-@pytest.mark.parametrize(("file", "change", "words", "told"), FOUND, ids=[f"{one[0]}-{one[3]}" for one in FOUND])
+@pytest.mark.parametrize(("file", "change", "words", "lines"), FOUND, ids=[f"{one[0]}-{one[3]}" for one in FOUND])
 def test_what_was_found_is_answered(
-    file: str, change: Change, words: str, told: str, server: Server, good: Path, tmp_path: Path
+    file: str, change: Change, words: str, lines: str, server: Server, good: Path, tmp_path: Path
 ) -> None:
     shutil.copytree(good, tmp_path / "case")
     (tmp_path / "case" / file).write_bytes(change((good / file).read_bytes()))
     ran = server.run(words.split(), tmp_path / "case", 60.0, 10**9)
-    assert told in ran.out + ran.err
+    assert lines in ran.out + ran.err
     assert not faults(Pair(file, words), 0, ran)
 
 
 @pytest.mark.parametrize(
-    ("ran", "told"),
+    ("ran", "lines"),
     [
         (Ran(0, "fine", "", 0.1, 0.1, 1000), None),
         (Ran(1, "", "error: tracker: no samples\n", 0.1, 0.1, 1000), None),
@@ -209,9 +209,9 @@ def test_what_was_found_is_answered(
         (Ran(-9, "", "", 70.0, 60.1, 1000, "took too long"), "took too long: 60.1 s of a core"),
     ],
 )
-def test_what_counts_as_a_fault(ran: Ran, told: str | None) -> None:
+def test_what_counts_as_a_fault(ran: Ran, lines: str | None) -> None:
     found = faults(next(pair for pair in TABLE if pair.kind == "binary"), 0, ran)
-    assert (told is None and not found) or (told is not None and told in found[0])
+    assert (lines is None and not found) or (lines is not None and lines in found[0])
 
 
 def test_a_run_that_hangs_or_fills_the_memory_is_ended() -> None:

@@ -20,7 +20,7 @@ def _drawing(folder: Path, before: str = "", inside: str = "") -> Path:
 
 
 @pytest.mark.parametrize(
-    ("before", "inside", "told"),
+    ("before", "inside", "lines"),
     [
         ('<size nuserdata="400000000"/>', "", r'<size nuserdata="400000000">: at most 10000000 are read; make it smal'),
         ('<size memory="8G"/>', "", r"<size memory>: more than 4 GB; make it smaller"),
@@ -36,10 +36,10 @@ def _drawing(folder: Path, before: str = "", inside: str = "") -> Path:
     ],
 )
 def test_sizes_of_mjcf_are_asked_before_it_is_loaded(
-    before: str, inside: str, told: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    before: str, inside: str, lines: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("mujoco.MjModel", None)
-    with pytest.raises(DataError, match=rf"arm\.xml: .*{told}"):
+    with pytest.raises(DataError, match=rf"arm\.xml: .*{lines}"):
         mjcf_arm(_drawing(tmp_path, before, inside), tip="tip")
 
 

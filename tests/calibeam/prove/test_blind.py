@@ -35,9 +35,9 @@ def test_what_a_diagnosis_needs_loads_no_simulator(loaded: subprocess.CompletedP
 
 
 def test_the_diagnosing_process_gets_a_bare_environment() -> None:
-    told = bare_environment({"PATH": "/bin", "CALIBEAM_SEAL": "sealed", "PWD": "/home/proof", "OLDPWD": "/home"})
-    assert told["PATH"] == "/bin"
-    assert not {"CALIBEAM_SEAL", "PWD", "OLDPWD"} & set(told)
+    passed = bare_environment({"PATH": "/bin", "CALIBEAM_SEAL": "sealed", "PWD": "/home/proof", "OLDPWD": "/home"})
+    assert passed["PATH"] == "/bin"
+    assert not {"CALIBEAM_SEAL", "PWD", "OLDPWD"} & set(passed)
 
 
 @pytest.mark.skipif(not Path("/proc/self/environ").exists(), reason="needs /proc, to look into the process")

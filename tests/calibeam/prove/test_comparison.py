@@ -121,7 +121,7 @@ def test_a_hidden_angle_is_inferred_as_well_as_stated(folder: Path) -> None:
             assert hidden.rms_rad < 2.0 * hidden.expected_rad
 
 
-def test_the_doubt_of_a_hidden_angle_does_not_hang_on_the_angle(folder: Path) -> None:
+def test_the_uncertainty_of_a_hidden_angle_does_not_hang_on_the_angle(folder: Path) -> None:
     """A joint column that is wrong where it is hidden changes what is missed, and not the doubt stated before."""
     recording = read(folder)
     state = fit_geometry(session_of(recording.rig, recording.samples))

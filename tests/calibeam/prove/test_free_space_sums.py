@@ -38,7 +38,7 @@ def test_medians_by_instrument(case: Case, found: Found) -> None:
     assert (wire.cases, wire.geometry_m, wire.found_m) == (3, pytest.approx(5e-5), pytest.approx(2e-5))
 
 
-def test_a_comparison_is_read_beside_its_proof(case: Case, found: Found, tmp_path: Path) -> None:
+def test_a_comparison_is_read_next_to_its_proof(case: Case, found: Found, tmp_path: Path) -> None:
     cases = tuple(case((found(),), name=f"case-000{i}") for i in range(3))
     proof = ProofFile(SCHEMA, "calibeam 1", 21, True, "calibeam prove", "", 60.0, cases)
     assert pairs_of(proof, read_comparison(tmp_path)) == []

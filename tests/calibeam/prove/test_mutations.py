@@ -29,10 +29,10 @@ def test_each_takes_out_what_its_mechanism_does() -> None:
 
 def test_only_unknown_at_the_right_place_is_caught(case: Case, found: Found) -> None:
     there = msgspec.structs.replace(found(physics="unknown", named=False), unknown_there=True)
-    elsewhere = msgspec.structs.replace(there, located=False)
+    not_located = msgspec.structs.replace(there, located=False)
     named = NamedCause("joint2.angle", "q2", "backlash", 0.99, "", placed=True, right=False)
     assert caught(case((there,), kind="outside"))
-    assert not caught(case((elsewhere,), kind="outside"))
+    assert not caught(case((not_located,), kind="outside"))
     assert not caught(case((there,), (named,), kind="outside"))
     assert caught(case((msgspec.structs.replace(there, unknown_there=False),), kind="outside", unexplained=True))
 

@@ -27,7 +27,7 @@ def _proved(out: Path, *options: str) -> ProofFile:
     return msgspec.json.decode((out / "proof.json").read_bytes(), type=ProofFile)
 
 
-def _told(recorded: Path) -> Iterator[bytes]:
+def _recorded_bytes(recorded: Path) -> Iterator[bytes]:
     """All that a recording holds, unpacked: a truth in a compressed batch would be seen by nobody, and be read."""
     with recorded.open("rb") as file:
         for record in StreamReader(file, emit_chunks=False).records:
@@ -111,9 +111,9 @@ def test_a_fault_that_only_streams_tell_is_found_and_named(tmp_path: Path) -> No
     [slip] = case.defects[0].sizes
     assert abs(slip.said - slip.true) < 4.0 * slip.sigma
     recorded = tmp_path / "p" / "recordings" / case.name / "recording.mcap"
-    told = list(_told(recorded))
-    assert any(b"q1_rad" in text for text in told)
-    assert not any(word in text for text in told for word in (b"slip", str(case.seed).encode()))
+    texts = list(_recorded_bytes(recorded))
+    assert any(b"q1_rad" in text for text in texts)
+    assert not any(word in text for text in texts for word in (b"slip", str(case.seed).encode()))
 
 
 def test_a_seed_of_development_is_not_published(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -86,11 +86,11 @@ def test_a_column_that_would_name_the_cause_is_missing() -> None:
 
 def test_a_confused_rig_file_holds_the_numbers_of_its_table_under_the_other_name() -> None:
     _, case = _drawn("confused-convention")
-    stated = rig_document(case.belief)["arm"]["model"]
+    stated = rig_document(case.stated)["arm"]["model"]
     assert stated == {"irb120": "mdh", "large": "mdh", "ur5": "dh"}[case.drawn.drawing.name]
 
 
-def test_a_recording_states_a_load_centre_that_is_elsewhere() -> None:
+def test_a_recording_states_a_load_centre_that_is_at_another_place() -> None:
     _, case = _drawn("wrong-load-centre")
     stated_m = np.array([columns(case)[f"payload_com_{axis}_m"][0] for axis in "xyz"], dtype=np.float64)
     assert 0.08 <= float(np.linalg.norm(stated_m - case.table.scene.payload_com_m)) <= 0.2
@@ -103,8 +103,8 @@ def test_a_pair_is_of_one_plan_and_nothing_of_the_truth_is_in_it(trouble: str) -
     measured, simulated = pair_of(case)
     np.testing.assert_array_equal(measured.reading_rad, simulated.reading_rad)
     assert columns(measured).keys() == columns(simulated).keys()
-    assert rig_document(measured.belief) == rig_document(simulated.belief)
-    nominal = measured.drawn.believed.arm
+    assert rig_document(measured.stated) == rig_document(simulated.stated)
+    nominal = measured.drawn.nominal.arm
     np.testing.assert_array_equal(simulated.drawn.true.arm.fixed, nominal.fixed)
     assert measured.off
     assert not simulated.off
@@ -134,7 +134,7 @@ def test_three_targets_are_read_in_turn_and_a_repeat_is_of_one() -> None:
     np.testing.assert_array_equal(np.unique(case.target), [1, 2, 3])
     for group in range(1, int(case.table.repeat.max()) + 1):
         assert np.unique(case.target[case.table.repeat == group]).size == 1
-    document = rig_document(case.belief)
+    document = rig_document(case.stated)
     assert "point_m" not in document["tool"]
     stated_m = np.array([one["point_m"] for one in document["target"]])
     off_m = case.drawn.true.tool_point_m - stated_m[case.target - 1]

@@ -24,7 +24,7 @@ from calibrate.diagnose.record.schema import (
     SizeRecord,
     UnexplainedRecord,
 )
-from simulators.conceal.wanted import Beside, Wanted
+from simulators.conceal.wanted import SimulationKind, Wanted
 
 NAME = "case-0000"
 JOINT = """
@@ -63,7 +63,7 @@ def scored(tmp_path: Path) -> Scored:
         withheld: tuple[str, ...] = (),
         confused: bool = False,
         trouble: str = "",
-        beside: Beside | None = None,
+        beside: SimulationKind | None = None,
         differences: tuple[DifferenceRecord, ...] = (),
         **more: object,
     ) -> CaseScore:
@@ -191,7 +191,7 @@ def test_only_what_no_catalogue_lists_may_be_left_unexplained_at_its_place(
     assert case.defects[0].located is located
 
 
-def test_a_missing_column_has_to_be_named_in_doubt(scored: Scored, defect: MakeDefect) -> None:
+def test_a_missing_column_has_to_be_named_as_uncertain(scored: Scored, defect: MakeDefect) -> None:
     lacking = (NotRecorded("approach2", "approach1 ...", "backlash"),)
     hidden = (defect("backlash"),)
     assert scored(hidden, withheld=("approach",), verdict="undecidable", not_recorded=lacking).asks_for
@@ -246,7 +246,7 @@ def test_of_a_raised_trouble_structure_without_a_name_at_its_place_is_located(
 
 
 @pytest.mark.parametrize(("rows", "located"), [((76, 77, 79), True), ((76, 77, 90), False), ((), False)])
-def test_a_few_rows_that_stood_elsewhere_locate_a_shift_of_their_time(
+def test_a_few_rows_that_stood_at_another_place_locate_a_shift_of_their_time(
     scored: Scored, defect: MakeDefect, rows: tuple[int, ...], located: bool
 ) -> None:
     shift = defect("base-moved", "base.pose", drivers=("t",), figures={"at_s": 70.0, "until_s": 80.0})

@@ -45,11 +45,11 @@ def test_of_what_there_was_not_nothing_is_said(case: Case, found: Found) -> None
     assert "In short" in page
 
 
-def test_only_a_name_that_was_believed_is_a_wrong_name(case: Case, found: Found) -> None:
-    doubted = msgspec.structs.replace(ALARM, physics="latency", confidence=0.5)
-    [fault] = faults(case((found(),), (doubted, ALARM)))
+def test_only_a_name_that_was_trusted_is_a_wrong_name(case: Case, found: Found) -> None:
+    uncertain = msgspec.structs.replace(ALARM, physics="latency", confidence=0.5)
+    [fault] = faults(case((found(),), (uncertain, ALARM)))
     assert fault == "misnamed with confidence: backlash at joint2.angle"
-    assert faults(case((found(),), (doubted,))) == []
+    assert faults(case((found(),), (uncertain,))) == []
 
 
 def test_a_heading_says_what_was_hidden(case: Case, found: Found) -> None:

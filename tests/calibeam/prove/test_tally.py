@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import pytest
 
-from calibeam.prove.page import ELSEWHERE, confusion
+from calibeam.prove.page import OTHER_PLACE, confusion
 from calibeam.prove.record import CaseScore, DefectScore, NamedCause, SizeScore
 from calibeam.prove.tally import Share, by_effect, by_enr, by_trouble, faults, figures, plain, share
 
@@ -51,14 +51,14 @@ def test_structure_that_is_claimed_in_mere_noise_is_a_false_alarm(case: Case) ->
     assert faults(claimed) == ["false alarm"]
 
 
-def test_of_faint_causes_each_name_has_to_be_right_however_doubtful(case: Case, found: Found) -> None:
+def test_of_faint_causes_each_name_has_to_be_right_however_uncertain(case: Case, found: Found) -> None:
     faint = found(enr=0.2)
     cases = [case((faint,), (_said(confidence=0.4), _said(right=True), _said("unknown")))]
     table = {f.label: f.said for f in figures(cases)}
     assert table["faint (0.15 - 0.3): what is named is right"].startswith("50\u00a0% ")
 
 
-def test_a_name_that_is_believed_is_not_said_to_be_unknown(case: Case, found: Found) -> None:
+def test_a_name_that_is_trusted_is_not_said_to_be_unknown(case: Case, found: Found) -> None:
     outside = found(physics="unknown", named=False)
     for said, share_said in (((), "100\u00a0% "), ((_said(),), "0\u00a0% ")):
         table = {f.label: f.said for f in figures([case((outside,), said, kind="outside", unexplained=True)])}
@@ -86,7 +86,7 @@ def test_the_right_name_at_another_place_is_not_on_the_diagonal(case: Case, foun
     hidden, said, counts = confusion([case((found(located=False, named=False),), (_said("backlash"),))])
     assert hidden == ["backlash"]
     assert counts[0, said.index("backlash")] == 0
-    assert counts[0, said.index(ELSEWHERE)] == 1
+    assert counts[0, said.index(OTHER_PLACE)] == 1
 
 
 def test_the_confusion_matrix_has_right_answers_on_its_diagonal(case: Case, found: Found) -> None:

@@ -30,13 +30,13 @@ def ahead(rig: Rig) -> Ahead:
 @pytest.fixture(scope="session")
 def samples(rig: Rig, ahead: Ahead) -> list[Sample]:
     """Of every pose of the plan."""
-    rng, believed = np.random.default_rng(4), AssumedRig(rig)
+    rng, assumed = np.random.default_rng(4), AssumedRig(rig)
     sigma_m = (rig.noise.psd_m or 0.0) / np.sqrt(MEAN_OF)
     out: list[Sample] = []
     for k, key in enumerate(ahead.keys):
         q_rad = ahead.poses.q_rad[k]
         shaken = q_rad + rng.normal(0.0, rig.noise.joint_rad or 0.0, 6)
-        x1, y1, x2, y2 = believed.expect(shaken, key.placement, key.first).spots_m + rng.normal(0.0, sigma_m, 4)
+        x1, y1, x2, y2 = assumed.expect(shaken, key.placement, key.first).spots_m + rng.normal(0.0, sigma_m, 4)
         psd1, psd2 = (Spot(x, y, 4.0, sigma_m, sigma_m, lit=True) for x, y in ((x1, y1), (x2, y2)))
         look = Look(8.0 * k, 8.0 * k, q_rad, np.zeros(6), q_rad, None, {}, True, psd1, psd2, None, 0.1)
         out.append(Sample(look, key.placement, key.first, np.zeros(6, dtype=np.int64), None, False))

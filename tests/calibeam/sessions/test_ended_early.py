@@ -46,9 +46,9 @@ def ended(trouble: Trouble, why: BaseException) -> str:
     def run() -> None:
         raise why
 
-    with pytest.raises(PartialResult) as told:
+    with pytest.raises(PartialResult) as lines:
         kept(trouble, trouble, trouble, trouble, run)
-    return str(told.value)
+    return str(lines.value)
 
 
 @pytest.mark.parametrize("step", STEPS)
@@ -60,7 +60,7 @@ def test_a_clean_up_that_is_interrupted_begins_again_with_the_stop(step, times) 
 
 
 @pytest.mark.parametrize("why", [StoppedError("the session was aborted"), DeviceLost("psd: gone"), KeyboardInterrupt()])
-def test_whatever_ends_it_the_arm_is_told_to_stop_first(why) -> None:
+def test_whatever_ends_it_the_arm_is_asked_to_stop_first(why) -> None:
     trouble = Trouble()
     ended(trouble, why)
     assert trouble.done == ["stop", "event", "flush"]
@@ -68,9 +68,9 @@ def test_whatever_ends_it_the_arm_is_told_to_stop_first(why) -> None:
 
 def test_a_stop_that_cannot_be_delivered_is_said_and_the_samples_are_saved_all_the_same() -> None:
     trouble = Trouble(stop=[DeviceLost("robot: no way to the controller")])
-    told = ended(trouble, StoppedError("the session was aborted"))
+    lines = ended(trouble, StoppedError("the session was aborted"))
     assert (
-        "the stop command to the arm failed (robot: no way to the controller); check that the arm stands still" in told
+        "the stop command to the arm failed (robot: no way to the controller); check that the arm stands still" in lines
     )
     assert trouble.done == ["event", "flush"]
 
@@ -89,10 +89,10 @@ def test_what_ends_well_is_left_alone() -> None:
 
 def test_the_samples_of_the_whole_session_are_counted() -> None:
     trouble = Trouble()
-    with pytest.raises(PartialResult) as told:
+    with pytest.raises(PartialResult) as lines:
         kept(trouble, trouble, trouble, trouble, _aborted, Earlier(Path("session-1"), 35))
     assert "samples kept in session-1: 42 (7 of them in recording.mcap); `calibeam identify session-1`" in str(
-        told.value
+        lines.value
     )
 
 

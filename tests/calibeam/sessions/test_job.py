@@ -42,7 +42,7 @@ class Clock:
         return 50.0
 
 
-def write(job: Job, samples, keys, *, rig_text: str = TEXT, told: int | None = None, notes=None, events=()) -> None:
+def write(job: Job, samples, keys, *, rig_text: str = TEXT, named: int | None = None, notes=None, events=()) -> None:
     """A recording of these samples; of the last ones nobody told which pose they are."""
     notes = notes_of(job, 1) if notes is None else notes
     path = job.out / "recording.mcap"
@@ -55,7 +55,7 @@ def write(job: Job, samples, keys, *, rig_text: str = TEXT, told: int | None = N
             writer.event(Event(50.0, kind, detail))
         for k, (sample, key) in enumerate(zip(samples, keys, strict=True)):
             writer.sample(sample.row())
-            if told is None or k < told:
+            if named is None or k < named:
                 pose = {"placement": key.placement, "first": key.first, "index": key.index, "again": key.again}
                 writer.event(Event(50.0, "sample", {"pose": pose}))
 
@@ -81,12 +81,12 @@ def test_yesterday_s_samples_come_back_as_they_were(job, samples, ahead) -> None
 
 
 def test_a_sample_whose_event_was_lost_is_taken_once_more(job, samples, ahead) -> None:
-    write(job, samples[:5], ahead.keys[:5], told=4)
+    write(job, samples[:5], ahead.keys[:5], named=4)
     assert tuple(read_earlier_parts(job.out, job.rig).taken) == ahead.keys[:4]
 
 
 def test_a_recording_that_does_not_say_which_poses_it_holds_is_refused(job, samples, ahead) -> None:
-    write(job, samples[:2], ahead.keys[:2], told=0)
+    write(job, samples[:2], ahead.keys[:2], named=0)
     with pytest.raises(RecordingError, match="earlier version"):
         read_earlier_parts(job.out, job.rig)
 
@@ -131,7 +131,7 @@ def test_an_added_place_comes_after_the_others_which_stay_as_they_were(job, ahea
     assert part.rig.placements[4].psd1_in_base.rotation_rad == pytest.approx((0.0, 0.0, 1.5707963))
 
 
-def test_a_rig_file_that_takes_no_more_places_is_told() -> None:
+def test_a_rig_file_that_takes_no_more_places_is_reported() -> None:
     text = TEXT.replace("[[placement]]", "[[plaice]]")
     rig = parse_rig(TEXT, "rig")
     with pytest.raises(RigFileError, match="a station cannot be added"):
@@ -153,8 +153,8 @@ def test_more_poses_of_the_day_after_are_others_than_those_of_the_first_day(job,
     part = part_of(job, EarlierParts(dict(zip(first, samples, strict=False))), HALF_M)
     again = more_at(part, 2, HALF_M, part.options, 1)
     assert not {key for block in again for key in block.pose_keys()} & set(first)
-    elsewhere = more_at(part, 3, HALF_M, part.options, 1)
-    assert {key.index // MORE for block in elsewhere for key in block.pose_keys()} == {1}
+    other_station = more_at(part, 3, HALF_M, part.options, 1)
+    assert {key.index // MORE for block in other_station for key in block.pose_keys()} == {1}
 
 
 def plan_of(rig) -> PosePlan:
@@ -167,10 +167,10 @@ def test_a_plan_goes_on_with_its_poses_wherever_the_fixture_stands_now(job) -> N
     earlier = EarlierParts({PoseKey(2, 1, 0): None}, notes=notes_of(planned, 1), standing=2)  # type: ignore[dict-item]
     part = part_of(planned, earlier, HALF_M)
     assert (part.left, part.open_at(2), part.open_at(1)) == (2, True, False)
-    elsewhere = part_of(planned, with_fixture_moved(earlier, same_place(job.rig, 2), 2), HALF_M)
-    assert elsewhere.plan is not None
-    assert [block.placement for block in elsewhere.plan.block] == [4]
-    assert elsewhere.left == 2
+    other_station = part_of(planned, with_fixture_moved(earlier, same_place(job.rig, 2), 2), HALF_M)
+    assert other_station.plan is not None
+    assert [block.placement for block in other_station.plan.block] == [4]
+    assert other_station.left == 2
 
 
 @pytest.mark.parametrize(("plan", "says"), [("of today", "with another --plan"), (None, "with another --plan")])

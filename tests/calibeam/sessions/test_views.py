@@ -55,7 +55,7 @@ class Heard:
         self.shown.append(shown)
 
 
-def told(shown: SessionStatus, width: int = 80) -> str:
+def text_of(shown: SessionStatus, width: int = 80) -> str:
     console = Console(file=StringIO(), width=width)
     console.print(drawn(shown))
     return console.file.getvalue()
@@ -93,7 +93,9 @@ def reporter(rig, clock, heard) -> StatusReporter:
     ],
 )
 def test_the_view_says_in_capitals_what_goes_on_and_which_keys_serve(state, large, keys) -> None:
-    text = told(SessionStatus(state, progress=progress(), left_s=1080.0, forecast=Forecast(5, 2e-5, 34e-6, 12, 1e-5)))
+    text = text_of(
+        SessionStatus(state, progress=progress(), left_s=1080.0, forecast=Forecast(5, 2e-5, 34e-6, 12, 1e-5))
+    )
     assert large in text
     assert keys in text
     assert "3 of 78   18 min left" in text
@@ -106,7 +108,7 @@ def test_the_view_fits_a_terminal_of_eighty_columns(reporter, samples) -> None:
     reporter.progress(progress())
     for sample in samples[:9]:
         journal.sample(sample)
-    lines = told(reporter.shown).splitlines()
+    lines = text_of(reporter.shown).splitlines()
     assert max(map(len, (line.rstrip() for line in lines))) <= 80
     assert len(lines) < 24
     assert sum("°" in line for line in lines) == 3  # six joints, two a line
@@ -120,7 +122,7 @@ def test_the_keys_fit_a_terminal_of_eighty_columns(keys) -> None:
 def test_a_stop_that_does_not_reach_the_arm_is_the_largest_thing_on_the_screen(reporter, heard) -> None:
     reporter.asked("put the fixture at place 2")
     reporter.undelivered(DeviceLost("robot: no way to the controller"))
-    text = told(reporter.shown)
+    text = text_of(reporter.shown)
     assert "STOP NOT DELIVERED, PRESS THE RED EMERGENCY STOP" in text
     assert "robot: no way to the controller" in text
     assert heard.lines[-1] == (
@@ -128,7 +130,7 @@ def test_a_stop_that_does_not_reach_the_arm_is_the_largest_thing_on_the_screen(r
         True,
     )
     reporter.undelivered(None)
-    assert "NOT DELIVERED" not in told(reporter.shown)
+    assert "NOT DELIVERED" not in text_of(reporter.shown)
 
 
 def test_a_dark_face_is_said(reporter, samples) -> None:
@@ -138,11 +140,11 @@ def test_a_dark_face_is_said(reporter, samples) -> None:
 
     dark = replace(look, psd2=replace(look.psd2, x_m=np.nan, y_m=np.nan))
     journal.sample(replace(samples[0], look=dark))
-    assert "dark" in told(reporter.shown)
+    assert "dark" in text_of(reporter.shown)
 
 
 def test_who_is_asked_sees_nothing_else() -> None:
-    text = told(
+    text = text_of(
         SessionStatus(RunState.RUNNING, progress=progress(), asked="put the fixture at place 2, then press ENTER")
     )
     assert "YOUR TURN" in text
@@ -176,7 +178,7 @@ def test_the_first_poses_give_no_time(clock) -> None:
 
 
 @pytest.mark.parametrize(("seconds", "words"), [(2.0, "5 s"), (44.0, "45 s"), (90.0, "2 min"), (3900.0, "1 h 05 min")])
-def test_times_are_told_as_anybody_plans_by_them(seconds, words) -> None:
+def test_times_are_reported_as_anybody_plans_by_them(seconds, words) -> None:
     assert clock_words(seconds) == words
 
 
@@ -204,19 +206,19 @@ def test_plain_output_is_a_line_every_ten_poses(heard) -> None:
     ]
 
 
-def test_the_page_is_told_the_same_and_what_it_draws_by() -> None:
+def test_the_page_is_reported_the_same_and_what_it_draws_by() -> None:
     class Feed(type(SILENT)):
         def __init__(self) -> None:
-            self.told: list[object] = []
+            self.shown_states: list[object] = []
 
         def progress(self, progress: PageProgress) -> None:
-            self.told.append(progress)
+            self.shown_states.append(progress)
 
         def stands(self, placement: int, first_psd: int) -> None:
-            self.told.append((placement, first_psd))
+            self.shown_states.append((placement, first_psd))
 
         def believes(self, corrections) -> None:
-            self.told.append(corrections)
+            self.shown_states.append(corrections)
 
     feed = Feed()
     view = PageView(feed)
@@ -225,7 +227,7 @@ def test_the_page_is_told_the_same_and_what_it_draws_by() -> None:
     )
     view.shows(shown)
     view.shows(shown)
-    *once, last, again = feed.told[:2] + feed.told[2:]
+    *once, last, again = feed.shown_states[:2] + feed.shown_states[2:]
     assert once == [(1, 1), {"a": 1.0}]
     assert last == again == PageProgress("measurement", 3, 78, 60.0, "accuracy: not determined yet: ")
 

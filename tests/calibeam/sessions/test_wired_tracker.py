@@ -90,7 +90,7 @@ def test_a_tracker_that_falls_silent_stops_the_arm_and_is_named(tmp_path: Path) 
 
 
 @pytest.mark.endure  # 8 s; of the driver alone: tests/drivers/tracker/test_device.py
-def test_a_closed_connection_is_told(tmp_path: Path) -> None:
+def test_a_closed_connection_is_reported(tmp_path: Path) -> None:
     says = r"tracker: 127.0.0.1:\d+: the instrument closed the connection.*samples kept in .*: 1;"
     with Emulation(RIG_FILE, seed=5, time_scale=PACE) as emulation, pytest.raises(PartialResult, match=says):
         session(tmp_path, emulation, 1, lambda: emulation.inject("tracker", "disconnect", count=1))

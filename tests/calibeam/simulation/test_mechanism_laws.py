@@ -40,7 +40,7 @@ SIZE = 5e-5  # rad or m at a port: what a machine shows
 
 def rig_text_of(family: Family, *, in_turns: bool = False) -> str:
     """The rig file of that session."""
-    return toml_text(rig_document(conceal(wanted(family, in_turns=in_turns)).belief))
+    return toml_text(rig_document(conceal(wanted(family, in_turns=in_turns)).stated))
 
 
 class Bench:

@@ -10,7 +10,7 @@ import pytest
 from acquisition.recording import read
 from calibeam.notebook import Model
 from calibrate.apply.correct.corrected import Arms, Options
-from calibrate.diagnose.gross_errors import blunders_first
+from calibrate.diagnose.gross_errors import gross_errors_first
 from calibrate.diagnose.state.fitted import fit_geometry
 from calibrate.diagnose.state.session import session_of
 from calibrate.diagnose.with_model.from_diagnosis import model_of_fit
@@ -29,7 +29,7 @@ def drawn(folder, family, seed):
     case = conceal(Wanted(family=family, seed=seed, samples=200))
     write_case(case, folder)
     recording = read(folder / "recording")
-    cleared = blunders_first(recording.rig, recording.samples)
+    cleared = gross_errors_first(recording.rig, recording.samples)
     fit = fit_geometry(session_of(recording.rig, cleared.samples))
     return case, Model(model_of_fit(fit, fit, cleared, recording, "geometry alone"), "with care", "", ())
 

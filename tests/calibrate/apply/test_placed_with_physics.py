@@ -86,7 +86,7 @@ def test_the_report_of_a_model_with_physics_shows_what_is_left(slack, capsys):
     assert out.exists()
 
 
-def test_a_recording_is_opened_beside_it(slack):
+def test_a_recording_is_opened_next_to_it(slack):
     """The same samples, predicted in Python: as in the file."""
     folder, _, model = slack
     session = calibeam.open(folder / "recording")

@@ -52,7 +52,7 @@ def test_unseen_rows_are_predicted_to_the_noise(slipped):
     assert inside_95(residual, sigma) > 0.9
 
 
-def test_an_effect_of_a_session_is_left_out_and_named_elsewhere(slipped, capsys):
+def test_an_effect_of_a_session_is_left_out_and_named_at_another_place(slipped, capsys):
     folder, unseen, model, table, _, _ = slipped
     out = folder / "elsewhere.csv"
     assert run(["predict", str(folder / "model.json"), str(unseen), "--out", str(out)]) == 0
@@ -111,8 +111,8 @@ def test_between_the_rows_where_it_stepped_both_are_possible(slipped, capsys):
 def test_a_command_for_geometry_names_what_it_leaves_out(slipped, capsys):
     folder, _, model, _, _, _ = slipped
     run(["verify", str(folder / "recording"), "--model", str(folder / "model.json"), "--out", str(folder / "v.json")])
-    told = capsys.readouterr().err
-    assert f"its effects are left out: {model['effects'][0]['name']}" in told
+    lines = capsys.readouterr().err
+    assert f"its effects are left out: {model['effects'][0]['name']}" in lines
 
 
 def test_a_file_whose_effects_contradict_each_other_is_refused(slipped, tmp_path, capsys):

@@ -9,7 +9,7 @@ from rich.console import Console
 from calibeam.printing.comparison_lines import print_comparison
 from calibeam.results.comparison import compare
 from calibrate.compare.corrected import simulated_of
-from calibrate.compare.fit_to_simulation import beside
+from calibrate.compare.fit_to_simulation import fit_to_simulation
 from simulators.conceal.case_files import Made
 from tests.calibrate.compare.drawn_pairs import case_of, pair_of
 
@@ -78,7 +78,7 @@ def test_sigmas_hold_where_constants_were_dropped(tmp_path):
         case = case_of(family="tracker", seed=seed, arm="ur5", samples=80)
         measured, simulated = pair_of(tmp_path / str(seed), case, Made(truth), Made({}))
         pair = measured.samples, simulated.samples
-        found = beside(simulated_of(simulated.rig, simulated.samples), pair, np.random.default_rng(1))
+        found = fit_to_simulation(simulated_of(simulated.rig, simulated.samples), pair, np.random.default_rng(1))
         named = [(name, size) for one in found.constants for name, size in zip(one.names, one.sizes, strict=True)]
         off_by += [abs(size.value - truth.get(name, 0.0)) / size.sigma for name, size in named]
         kept += len(found.constants)

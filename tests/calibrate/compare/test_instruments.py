@@ -147,7 +147,7 @@ def test_a_noise_stated_far_too_small_is_a_wrong_statement_of_both_sides_and_no_
 
 
 @pytest.mark.endure  # daily: a blind joint of one session, in tests/calibrate/diagnose/assess/test_blind_joints.py
-def test_of_a_joint_on_whose_axis_the_target_lies_no_zero_is_told(tmp_path):
+def test_of_a_joint_on_whose_axis_the_target_lies_no_zero_is_reported(tmp_path):
     """The target stands a tenth of a millimetre off its axis, which a turn of the joint could explain."""
     drawn = recording_of(tmp_path, family="tracker", seed=3, samples=80)
     rig = structs.replace(drawn.rig, tool=structs.replace(drawn.rig.tool, point_m=(0.0, 0.0, 0.1)))

@@ -26,7 +26,7 @@ def poses():
     return np.random.default_rng(1).uniform(-1.0, 1.0, (40, 3))
 
 
-def test_rows_missing_on_either_side_are_told(poses):
+def test_rows_missing_on_either_side_are_reported(poses):
     one, two = np.delete(poses, [4, 5], axis=0), np.delete(poses, [20], axis=0)
     found = match(session(one), session(two))
     assert np.array_equal(one[found.measured], two[found.simulated])
@@ -47,7 +47,7 @@ def test_another_placement_is_another_sample(poses):
         match(one, two)
 
 
-def test_a_servo_that_stopped_a_little_elsewhere_is_the_same_pose(poses):
+def test_a_servo_that_stopped_a_little_at_another_place_is_the_same_pose(poses):
     found = match(session(poses + 0.4 * SAME_RAD), session(poses))
     assert len(found.measured) == 40
 

@@ -65,10 +65,10 @@ def test_the_plan_promises_less_error_than_random_poses(made):
 def test_expected_spots_are_those_of_the_rig_as_drawn(rig, candidates, made):
     from calibrate.model.assumed_rig import AssumedRig
 
-    believed = AssumedRig(rig)
+    assumed = AssumedRig(rig)
     for block in made.plan.block:
         for pose in block.pose:
-            spots = believed.spots(np.array(pose.q_rad), block.placement, block.first_psd)
+            spots = assumed.spots(np.array(pose.q_rad), block.placement, block.first_psd)
             np.testing.assert_allclose(spots, pose.spots_m, atol=1e-8)
 
 
@@ -76,11 +76,11 @@ def test_candidates_are_within_limits_above_the_table_and_lit(rig, candidates):
     from acquisition.centring.aim import clear_of_table
     from calibrate.model.assumed_rig import AssumedRig, Light
 
-    believed = AssumedRig(rig)
+    assumed = AssumedRig(rig)
     for q, place, first in zip(candidates.q_rad, candidates.placement, candidates.first_psd, strict=True):
-        assert believed.expect(q, int(place), int(first)).light is Light.BOTH_LIT
-        assert clear_of_table(believed.arm, q)
-        assert np.all((q >= believed.arm.lower_rad) & (q <= believed.arm.upper_rad))
+        assert assumed.expect(q, int(place), int(first)).light is Light.BOTH_LIT
+        assert clear_of_table(assumed.arm, q)
+        assert np.all((q >= assumed.arm.lower_rad) & (q <= assumed.arm.upper_rad))
 
 
 def test_no_candidate_comes_near_a_keep_out_box(rig):
@@ -138,7 +138,7 @@ def test_what_cannot_be_designed_is_refused(rig, candidates, information, asked,
         design(rig, candidates, information, asked)
 
 
-def test_a_rig_without_an_instrument_is_refused_and_a_measuring_arm_told_that_it_needs_no_plan():
+def test_a_rig_without_an_instrument_is_refused_and_a_measuring_arm_informed_that_it_needs_no_plan():
     arm = load_rig(RIG.with_name("arm-cmm-reference.toml"))
     with pytest.raises(DataError, match="not for cones and bars"):
         candidates_of(arm, 4, np.random.default_rng(1))
@@ -188,8 +188,8 @@ def test_poses_before_a_tracker_are_designed_too(rig):
         device=Pose((2.0, 0.5, 0.3), (0.0, 0.0, 2.0)),
     )
     offered = candidates_of(tracked, 10, np.random.default_rng(1))
-    believed = offered.reading @ transform((0.0, 0.0, 0.0), (0.0, 0.0, 2.0))[:3, :3].T + [2.0, 0.5, 0.3]
-    assert believed[:, 2].min() > 0.0
+    assumed = offered.reading @ transform((0.0, 0.0, 0.0), (0.0, 0.0, 2.0))[:3, :3].T + [2.0, 0.5, 0.3]
+    assert assumed[:, 2].min() > 0.0
     found = information_of(tracked, offered, np.random.default_rng(2))
     made = design(tracked, offered, found, DesignOptions(poses=30, repeats=2))
     assert found.target == "the tool's point"

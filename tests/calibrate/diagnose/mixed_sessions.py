@@ -37,7 +37,7 @@ def full_pose(folder, **wanted):
     noise = turned(TURN_RAD * rng.standard_normal((len(seen), 3)))
     vectors = rotation_vectors((noise @ seen)[:, :3, :3])
     table = columns(case) | {f"r{axis}_rad": v.tolist() for axis, v in zip("xyz", vectors.T, strict=True)}
-    return written(folder, rig_document(case.belief), table), case
+    return written(folder, rig_document(case.stated), table), case
 
 
 def tracker_and_cones(folder, share=0.5, **wanted):
@@ -51,8 +51,8 @@ def tracker_and_cones(folder, share=0.5, **wanted):
     for name in ("x_m", "y_m", "z_m"):
         table[name] = [None if s else v for v, s in zip(table[name], seated, strict=True)]
     table = _with_joints(table, reading, seated)
-    table["seat"] = _beside(seat, seated)
-    document = rig_document(case.belief)
+    table["seat"] = _where(seat, seated)
+    document = rig_document(case.stated)
     document["noise"]["seat_m"] = CONTACT_M
     return written(folder, document, table), case
 
@@ -73,7 +73,7 @@ def spots_and_bar(folder, holdings=20, **wanted):
     table = _with_joints(table, reading, seated)
     table["bar"] = [1 if s else None for s in seated]
     table["bar_end"] = [None] * (rows - 2 * holdings) + ["a", "b"] * holdings
-    document = rig_document(case.belief)
+    document = rig_document(case.stated)
     document["tool"]["point_m"] = list(PROBE_M)
     document["bar"] = [{"id": 1, "length_m": length_m}]
     document["noise"]["seat_m"] = CONTACT_M
@@ -142,7 +142,7 @@ def _with_joints(table, reading, seated):
     return {name: v for name, v in out.items() if not name.startswith("cmd")}
 
 
-def _beside(values, where):
+def _where(values, where):
     out = [None] * len(where)
     for row, value in zip(np.flatnonzero(where).tolist(), values.tolist(), strict=True):
         out[row] = value

@@ -77,7 +77,7 @@ def test_a_table_by_the_other_convention_of_denavit_and_hartenberg_is_named(tmp_
     assert (fault.kind, fault.whole_file) == (GrossErrorKind.TABLE_CONVENTION, True)
 
 
-def test_an_arm_that_stays_far_beside_its_readings_has_no_findings(recording):
+def test_an_arm_that_stays_far_off_its_readings_has_no_findings(recording):
     columns = dict(recording.samples.columns)
     order = [f"q{joint}_rad" for joint in (3, 1, 2, 5, 6, 4)]  # columns that somebody has mixed up
     mixed = replace(
@@ -180,7 +180,7 @@ def test_a_bumped_tracker_may_as_well_be_a_moved_base_and_no_pose_tells(tmp_path
     assert other.alike
     assert abs(other.margin) < 0.5
     assert finding.confidence == pytest.approx(0.5, abs=0.1)
-    assert any("alike at every pose" in told for told in found.next)
+    assert any("alike at every pose" in lines for lines in found.next)
 
 
 @pytest.mark.parametrize(

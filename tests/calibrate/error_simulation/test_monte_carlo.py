@@ -42,10 +42,10 @@ def test_memory_does_not_grow_with_the_arms(machine, poses, every):
 
 
 def test_progress_ends_at_all_arms(machine, poses, every):
-    told = []
+    lines = []
     rms = propagate(machine, every, poses).rms_m
-    draw_arms(machine, every, poses, CHUNK + 1, seed=1, rms_m=rms, progress=lambda *x: told.append(x))
-    assert told == [(CHUNK, CHUNK + 1), (CHUNK + 1, CHUNK + 1)]
+    draw_arms(machine, every, poses, CHUNK + 1, seed=1, rms_m=rms, progress=lambda *x: lines.append(x))
+    assert lines == [(CHUNK, CHUNK + 1), (CHUNK + 1, CHUNK + 1)]
 
 
 def test_quantiles_of_a_radial_normal_error_are_those_of_its_law(machine, poses, stated):

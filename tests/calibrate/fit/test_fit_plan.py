@@ -8,7 +8,7 @@ from acquisition.recording.rig import ArmModel
 from calibrate.errors import DataError
 from calibrate.fit.fit_plan import (
     DEFAULT,
-    BesideName,
+    MethodName,
     parse_plan,
     read_plan,
 )
@@ -24,7 +24,7 @@ def test_the_example_of_the_documentation_is_a_plan(request):
     assert plan.model is ArmModel.LOCAL_POE
     assert plan.instruments == ("position", "wire")
     assert (plan.algorithm, plan.robust_loss, plan.of_redundant) == (Method.DOGLEG, Loss.HUBER, Redundant.REMOVED)
-    assert plan.method is BesideName.POINT_CONSTRAINT
+    assert plan.method is MethodName.POINT_CONSTRAINT
     assert plan.splits == (SplitKind.RANDOM, SplitKind.LAST)
     assert plan.priors == {"link*.x": 5e-4, "link2.*": 1e-3}
 

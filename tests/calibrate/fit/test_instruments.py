@@ -103,7 +103,7 @@ def test_exact_positions_are_explained_to_rounding_without_any_device_in_the_rig
     assert left_m(found) < 1e-9
 
 
-def test_a_device_in_the_rig_is_a_start_and_with_a_tolerance_a_belief(rig, truth):
+def test_a_device_in_the_rig_is_a_start_and_with_a_tolerance_a_prior(rig, truth):
     q = random_readings()
     samples = table(q, **position_columns(truth, q))
     rough = msgspec.structs.replace(rig, device=Pose((1.7, -0.5, 0.5), (0.3, -0.4, 2.1)))
@@ -111,8 +111,8 @@ def test_a_device_in_the_rig_is_a_start_and_with_a_tolerance_a_belief(rig, truth
     assert {p.prior for p in found.weighting.parameters if p.name.startswith("device")} == {np.inf}
     assert_allclose(found.start[[p.name for p in found.weighting.parameters].index("device.yaw")], 0.1, atol=0.02)
     tolerance = msgspec.structs.replace(rig.tolerance, device_m=0.2, device_rad=0.3)
-    believed = instruments_of(samples, msgspec.structs.replace(rough, tolerance=tolerance))
-    assert [p.prior for p in believed.weighting.parameters if p.name.startswith("device")] == [0.2] * 3 + [0.3] * 3
+    assumed = instruments_of(samples, msgspec.structs.replace(rough, tolerance=tolerance))
+    assert [p.prior for p in assumed.weighting.parameters if p.name.startswith("device")] == [0.2] * 3 + [0.3] * 3
 
 
 def test_a_target_that_nobody_states_is_found_with_the_frame(rig, truth):
@@ -232,8 +232,8 @@ def test_sizes_of_joint_and_tracker_noise_are_both_found(rig, truth):
     found = instruments_of(table(read, **position_columns(truth, q, 40e-6)), rig)
     fit, problem, _ = fitted(found)
     factors = found.weighting.noise(problem.parameters, fit.theta)
-    believed = np.array([found.weighting.joint_rad, 20e-6])
-    true = np.array([3e-5, 40e-6]) / believed
+    assumed = np.array([found.weighting.joint_rad, 20e-6])
+    true = np.array([3e-5, 40e-6]) / assumed
     assert found.weighting.sources == ("joint", "position")
     assert np.all(np.abs(factors.factor - true) < 4.0 * factors.factor_sigma)
     assert np.all(factors.factor_sigma < 0.25 * factors.factor)
@@ -256,7 +256,7 @@ def test_several_instruments_at_once_share_arm_tool_and_device(rig, truth):
     assert [m.problem.rows for m in cut.measured] == [2, 2]
 
 
-def test_rows_without_an_observation_are_told(rig, truth):
+def test_rows_without_an_observation_are_reported(rig, truth):
     q = random_readings()
     position = position_columns(truth, q)
     for column in position.values():

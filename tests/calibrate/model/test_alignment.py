@@ -107,7 +107,7 @@ def test_bad_shots_do_not_pull_the_start(points):
 
 
 @pytest.mark.parametrize("axis", range(3))
-def test_a_mirrored_axis_is_told(points, axis):
+def test_a_mirrored_axis_is_reported(points, axis):
     seen = seen_from_b(points)
     seen[:, axis] *= -1.0
     found = align(points, seen)

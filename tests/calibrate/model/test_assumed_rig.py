@@ -29,30 +29,30 @@ def corrected(request, rig, sessions):
 
 
 def test_expected_spots_and_joint_derivative_are_those_of_the_fit(corrected):
-    session, chain, theta, believed = corrected
+    session, chain, theta, assumed = corrected
     spots, by_joint = chain.expect(theta, session.q_rad), chain.by_joint(theta, session.q_rad)
     for i, (q, place, first) in enumerate(zip(session.q_rad, session.placement, session.first_psd, strict=True)):
-        expected = believed.expect(q, int(place), int(first))
+        expected = assumed.expect(q, int(place), int(first))
         np.testing.assert_allclose(expected.spots_m, spots[i], atol=1e-14)
         np.testing.assert_allclose(expected.by_joint, by_joint[i], atol=1e-12)
-        spots_m, light = believed.struck(believed.flange(q), int(place), int(first))
+        spots_m, light = assumed.struck(assumed.flange(q), int(place), int(first))
         np.testing.assert_array_equal(spots_m, expected.spots_m)
         assert light is expected.light
 
 
 def test_nominal_rig_follows_the_ray_and_lights_both_faces(rig, sessions, ur5e_exact):
     session = sessions(32, n=20, truth=None)
-    believed = AssumedRig(rig)
+    assumed = AssumedRig(rig)
     angles = session.q_rad + session.truth.zeros
     for q, place, first in zip(angles, session.placement, session.first_psd, strict=True):
-        expected = believed.expect(q, int(place), int(first))
+        expected = assumed.expect(q, int(place), int(first))
         np.testing.assert_allclose(expected.spots_m, ur5e_exact().spots(q, place, first), atol=1e-13)
-    assert believed.expect(angles[0] + np.array([np.pi, 0, 0, 0, 0, 0]), 1, 1).light is not Light.BOTH_LIT
+    assert assumed.expect(angles[0] + np.array([np.pi, 0, 0, 0, 0, 0]), 1, 1).light is not Light.BOTH_LIT
 
 
-def test_light_says_both_lit_beside_the_face_and_wrong_way(rig):
-    believed = AssumedRig(rig)
-    fixture = believed.fixture
+def test_light_says_both_lit_off_the_face_and_wrong_way(rig):
+    assumed = AssumedRig(rig)
+    fixture = assumed.fixture
     for first in (1, 2):
         point, direction = fixture.line(np.zeros(4), first)
         origin = point - 0.2 * direction
@@ -72,36 +72,36 @@ def test_a_line_for_given_spots_gives_those_spots(rig):
 
 
 def test_beam_derivatives_are_differences(corrected):
-    session, _, _, believed = corrected
+    session, _, _, assumed = corrected
     q = session.q_rad[0]
-    beam = np.concatenate(believed.beam(q))
+    beam = np.concatenate(assumed.beam(q))
     steps = np.eye(6) * 1e-6
     numeric = np.stack(
-        [(np.concatenate(believed.beam(q + h)) - np.concatenate(believed.beam(q - h))) / 2e-6 for h in steps], axis=1
+        [(np.concatenate(assumed.beam(q + h)) - np.concatenate(assumed.beam(q - h))) / 2e-6 for h in steps], axis=1
     )
-    np.testing.assert_allclose(believed.arm.beam_jacobian(q), numeric, atol=1e-9)
-    T = believed.T_base_psd1(int(session.placement[0]))
+    np.testing.assert_allclose(assumed.arm.beam_jacobian(q), numeric, atol=1e-9)
+    T = assumed.T_base_psd1(int(session.placement[0]))
     origin, direction = T[:3, :3].T @ (beam[:3] - T[:3, 3]), T[:3, :3].T @ beam[3:]
     line = np.concatenate([origin, direction])
-    spots = [[believed.fixture.spots(*np.split(line + s * h, 2), 1) for s in (1, -1)] for h in steps]
+    spots = [[assumed.fixture.spots(*np.split(line + s * h, 2), 1) for s in (1, -1)] for h in steps]
     np.testing.assert_allclose(
-        believed.fixture.spots_by_beam(origin, direction, 1),
+        assumed.fixture.spots_by_beam(origin, direction, 1),
         np.stack([(up - down) / 2e-6 for up, down in spots], axis=1),
         atol=1e-6,
     )
 
 
 def test_the_flange_is_that_of_the_arm(corrected):
-    session, chain, theta, believed = corrected
+    session, chain, theta, assumed = corrected
     q, n = session.q_rad[:3], len(chain.model.parameters)
-    np.testing.assert_allclose([believed.flange(row) for row in q], chain.model.flange(theta[:n], q), atol=1e-14)
+    np.testing.assert_allclose([assumed.flange(row) for row in q], chain.model.flange(theta[:n], q), atol=1e-14)
 
 
 def test_unknown_names_are_refused(rig):
-    believed = AssumedRig(rig)
+    assumed = AssumedRig(rig)
     with pytest.raises(DataError, match=r"placement 7 is not in the rig \(known: 1, 2, 3\)"):
-        believed.spots(np.zeros(6), 7, 1)
+        assumed.spots(np.zeros(6), 7, 1)
     with pytest.raises(DataError, match="first_psd 3"):
-        believed.spots(np.zeros(6), 1, 3)
+        assumed.spots(np.zeros(6), 1, 3)
     with pytest.raises(KeyError, match=r"joint9\.zero"):
         AssumedRig(rig, {"joint9.zero": 0.1})

@@ -72,9 +72,9 @@ def test_the_turn_of_arm_and_cones_looks_seen_in_noise_and_is_not_where_the_cond
 def test_cones_alone_come_to_an_end_and_tell_no_number_for_what_turns_or_grows_with_them(rig, cones):
     result = identify(rig, cones, rng=np.random.default_rng(1), held_out_share=0.0)
     assert result.status in (Status.CONVERGED, Status.RANK_DEFICIENT)
-    told = {e.name: e.value for e in result.estimates}
-    assert [told[n] for n in ("joint1.zero", "joint6.zero", "link2.length", "link3.length")] == [None] * 4
-    assert told["joint3.zero"] is not None
+    lines = {e.name: e.value for e in result.estimates}
+    assert [lines[n] for n in ("joint1.zero", "joint6.zero", "link2.length", "link3.length")] == [None] * 4
+    assert lines["joint3.zero"] is not None
 
 
 def test_readings_are_left_alone_where_there_is_something_to_read(rig, cones):

@@ -69,9 +69,9 @@ def test_the_file_names_rig_software_rank_noise_and_proof(written):
 
 def test_corrections_of_the_file_predict_the_spots(identified, written):
     session, rig, _ = identified
-    believed = AssumedRig(rig, corrections(read_model(written[0])))
+    assumed = AssumedRig(rig, corrections(read_model(written[0])))
     rows = zip(session.q_rad, session.placement, session.first_psd, strict=True)
-    predicted = np.array([believed.spots(q, int(place), int(first)) for q, place, first in rows])
+    predicted = np.array([assumed.spots(q, int(place), int(first)) for q, place, first in rows])
     assert np.sqrt(np.mean((predicted - session.spots_m) ** 2)) < 5e-6
 
 

@@ -63,8 +63,8 @@ def test_residuals_stand_where_the_row_has_an_observation(predictor):
     given = predict(predictor, table())
     x = given["x_m"] - 1e-3
     x[1] = np.nan
-    beside = np.where(np.isnan(x), np.nan, 0.0)
-    out = predict(predictor, table(x_m=x, y_m=beside, z_m=beside))
+    zeros = np.where(np.isnan(x), np.nan, 0.0)
+    out = predict(predictor, table(x_m=x, y_m=zeros, z_m=zeros))
     np.testing.assert_allclose(out["r_x_m"], [1e-3, np.nan, 1e-3], atol=1e-12)
     assert np.all(np.isfinite(out["x_m"]))
 
@@ -93,8 +93,8 @@ def test_a_wire_is_the_distance_from_the_origin_of_the_device(predictor, tips):
 
 def test_a_model_that_knows_only_distances_predicts_those_between_rows(rig, tips):
     only = Predictor(rig, {"tool.x": 1e-3}, {"tool": (0.02, -0.01, 0.08)}, ("distance",))
-    elsewhere = pose((5.0, -2.0, 1.0), TURN)  # a frame that nobody knows
-    moved = tips @ elsewhere[:3, :3].T + elsewhere[:3, 3]
+    unknown_frame = pose((5.0, -2.0, 1.0), TURN)  # a frame that nobody knows
+    moved = tips @ unknown_frame[:3, :3].T + unknown_frame[:3, 3]
     out = predict(only, table(**dict(zip(("x_m", "y_m", "z_m"), moved.T, strict=True))))
     assert list(out) == ["t_s", "distance_m", "r_distance_m"]
     spans = np.linalg.norm(np.diff(tips, axis=0), axis=1)

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 from acquisition.recording import Recording, Samples
 from acquisition.recording.rig import parse_rig, rig_sha256, rig_text
 from calibeam.results.identification import identify_session, session_model
-from calibrate.diagnose.gross_errors import blunders_first
+from calibrate.diagnose.gross_errors import gross_errors_first
 from calibrate.diagnose.state.fitted import fit_geometry
 from calibrate.diagnose.state.session import session_of
 from calibrate.diagnose.with_model.from_diagnosis import model_of_fit
@@ -87,7 +87,7 @@ class ArmSession:
 
     def model_of_diagnosis(self, recording: Recording) -> ModelFile:
         """As of a diagnosis that has found no effect."""
-        cleared = blunders_first(recording.rig, recording.samples)
+        cleared = gross_errors_first(recording.rig, recording.samples)
         fit = fit_geometry(session_of(recording.rig, cleared.samples))
         return model_of_fit(fit, fit, cleared, recording, "geometry alone")
 

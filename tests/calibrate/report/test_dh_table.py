@@ -109,7 +109,7 @@ def test_page_and_terminal_show_every_joint_and_number_to_two_digits_of_sigma(
         assert any(list(shown) == line[1:6] for line in terminal)
 
 
-def test_beside_held_lengths_only_zeros_have_numbers(identified, tmp_path):
+def test_with_held_lengths_only_zeros_have_numbers(identified, tmp_path):
     folder, out = identified[0] / "session", tmp_path / "zeros.json"
     assert run(["identify", str(folder), "--zeros-only", "--out", str(out)]) == 0
     rows = rows_of(session_evidence(read(folder), read_model(out)))

@@ -66,12 +66,12 @@ def test_a_moved_zero_is_found_with_its_size_and_no_other(drift):
     assert drift.compared.together.significant
 
 
-def test_the_sentence_names_joint_size_doubt_and_what_the_tool_is_off(drift):
-    told = sentence(drift)
-    number = re.search(r"joint 3 moved by (0\.\d+)° \(([\d.]+)\s?sigma\)", told)
-    assert number is not None, told
+def test_the_sentence_names_joint_size_uncertainty_and_what_the_tool_is_off(drift):
+    lines = sentence(drift)
+    number = re.search(r"joint 3 moved by (0\.\d+)° \(([\d.]+)\s?sigma\)", lines)
+    assert number is not None, lines
     assert float(number[1]) == pytest.approx(np.degrees(MOVED_RAD), abs=0.005)
-    assert re.search(r"tool error up to \d+", told)
+    assert re.search(r"tool error up to \d+", lines)
 
 
 def test_the_tool_moves_by_the_lever_of_the_joint(drift):

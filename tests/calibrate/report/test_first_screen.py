@@ -44,15 +44,15 @@ class Letters(HTMLParser):
         self.printed: dict[str, float] = {}
 
     def handle_starttag(self, tag: str, attrs) -> None:
-        told = dict(attrs)
+        attributes = dict(attrs)
         if tag == "div":
-            self.wide.append("wide" in told.get("class", ""))
+            self.wide.append("wide" in attributes.get("class", ""))
         if tag == "svg":
             room = PAGE_MM if any(self.wide) else PANEL_MM
-            self.scale = room * MM / float(told["viewbox"].split()[2])
-            self.label = told["aria-label"]
+            self.scale = room * MM / float(attributes["viewbox"].split()[2])
+            self.label = attributes["aria-label"]
         if tag == "text":
-            style = told.get("style", "")
+            style = attributes.get("style", "")
             size = re.search(r"(?:font-size:\s*|font:[^;]*?)([\d.]+)px", style)
             assert size is not None, style
             self.printed[self.label] = min(self.printed.get(self.label, 99.0), float(size[1]) * self.scale)
@@ -63,7 +63,7 @@ class Letters(HTMLParser):
 
 
 @pytest.mark.parametrize("trust", list(Trust))
-def test_trust_is_told_by_mark_and_word_not_by_colour_alone(trust):
+def test_trust_is_reported_by_mark_and_word_not_by_colour_alone(trust):
     number = Number("now", "Identified", 1e-4, "m", "100 µm", "rms")
     page = first_screen(Answers(VerdictBox(trust, "It is so.", ("because",), ("do it",)), (number, number, number)))
     assert all(question in page for question in QUESTIONS)
@@ -86,7 +86,7 @@ def test_the_tool_comes_first_then_readings_and_anywhere(known):
     ]
 
 
-def test_a_number_that_cannot_be_told_is_a_dash_with_its_reason(known):
+def test_a_number_that_cannot_be_reported_is_a_dash_with_its_reason(known):
     hidden = msgspec.structs.replace(known.model.free_space, pose_p95_m=None, says="something moves the target")
     model = msgspec.structs.replace(known.model, free_space=hidden)
     number = session_answers(replace(known, model=model)).numbers[4]

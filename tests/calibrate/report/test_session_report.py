@@ -111,7 +111,7 @@ def test_residuals_are_whitened_by_the_noise_that_was_found(poses):
         assert 0.8 < np.sqrt(np.mean(readings.whitened**2)) < 1.1
 
 
-def test_a_pose_is_told_as_position_in_metres_and_orientation_in_radians(poses):
+def test_a_pose_is_reported_as_position_in_metres_and_orientation_in_radians(poses):
     position, orientation = session_evidence(*poses).readings
     assert (position.unit, orientation.unit) == ("m", "rad")
     assert np.sqrt(np.mean(position.error_after**2)) == pytest.approx(np.sqrt(3) * 20e-6, rel=0.25)
@@ -121,7 +121,7 @@ def test_a_pose_is_told_as_position_in_metres_and_orientation_in_radians(poses):
     assert "µrad" in text
 
 
-def test_proofs_by_every_split_observability_and_free_space_are_told(page, wire_and_positions):
+def test_proofs_by_every_split_observability_and_free_space_are_reported(page, wire_and_positions):
     model, text = wire_and_positions[1], text_of(page)
     assert model.proofs
     for proof in model.proofs:

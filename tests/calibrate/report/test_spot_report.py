@@ -98,16 +98,16 @@ def test_all_chapters_are_there_and_the_point_constraint_only_where_it_is_asked_
     assert page.count("<svg") >= 9
 
 
-def test_the_point_constraint_stands_beside_the_fit_where_the_plan_names_it(recorded, spots, bare_figures) -> None:
+def test_the_point_constraint_stands_next_to_the_fit_where_the_plan_names_it(recorded, spots, bare_figures) -> None:
     planned = Planned(parse_plan(PLAN, "fit.toml"), PLAN)
     found = identify_session(recorded, planned)
     assert found.point_constraints is not None
     assert len(found.point_constraints.four_poses.zeros) == 6
     np.testing.assert_allclose(found.theta, spots.theta, atol=1e-9)  # the model is that of the fit
-    told = text_of(session_page(session_evidence(recorded, session_model(found, recorded, planned))))
-    assert "Point constraint" in told
-    assert "Four poses at station" in told
-    assert "centred poses at station" in told
+    lines = text_of(session_page(session_evidence(recorded, session_model(found, recorded, planned))))
+    assert "Point constraint" in lines
+    assert "Four poses at station" in lines
+    assert "centred poses at station" in lines
 
 
 def test_without_a_fit_that_ended_nothing_is_trusted(spots) -> None:
@@ -118,7 +118,7 @@ def test_without_a_fit_that_ended_nothing_is_trusted(spots) -> None:
         assert status.value in judged.sentence
 
 
-def test_noise_that_did_not_settle_and_noise_that_cannot_be_told_from_none_are_said(spots) -> None:
+def test_noise_that_did_not_settle_and_noise_that_cannot_be_distinguished_from_none_are_said(spots) -> None:
     noise = {**spots.model.noise, "settled": False, "joint_at_zero": True}
     known = replace(spots, model=msgspec.structs.replace(spots.model, noise=noise))
     assert any("did not settle" in reason for reason in session_verdict(known).reasons)
@@ -134,7 +134,7 @@ def test_a_recording_without_centring_and_origin_says_so(spots) -> None:
     assert provenance(bare, 9, "with both spots", "calibeam").count("not stated") >= 2
 
 
-def test_a_zero_that_the_drawing_limits_is_told_from_one_that_the_measurement_limits(spots) -> None:
+def test_a_zero_that_the_drawing_limits_is_distinguished_from_one_that_the_measurement_limits(spots) -> None:
     zero = next(z for z in zeros_of(spots) if z.joint == 4)
     assert limited_by_measurement(replace(zero, sigma_rad=2e-6, measurement_sigma_rad=1.5e-6))
     assert not limited_by_measurement(replace(zero, sigma_rad=5e-4, measurement_sigma_rad=1e-6))

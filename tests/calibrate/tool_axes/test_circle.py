@@ -30,7 +30,7 @@ def test_without_noise_centre_axis_and_radius_are_exact(sense):
     assert circle.radius_m == pytest.approx(0.25, abs=1e-10)
 
 
-def test_the_doubt_is_that_of_repeated_experiments():
+def test_the_uncertainty_is_that_of_repeated_experiments():
     angle = np.linspace(-0.8, 0.8, 20)
     fits = [fit_circle(points(angle, noise_m=20e-6, seed=s), angle) for s in range(200)]
     centre = np.array([c.centre_m for c in fits])

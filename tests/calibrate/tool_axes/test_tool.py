@@ -97,12 +97,12 @@ def test_with_noise_the_errors_are_as_large_as_stated(arm, positions):
 
 def test_the_wrist_s_last_joint_alone_is_not_enough(arm, positions):
     q = turns(4, 6)
-    with pytest.raises(DataError, match="joint 5 alone and 6 alone are needed") as told:
+    with pytest.raises(DataError, match="joint 5 alone and 6 alone are needed") as lines:
         calibrated(arm, q, positions(q))
-    assert str(told.value).endswith("found single rotations of joint 4 (rows 1-16), 6 (rows 17-31)")
+    assert str(lines.value).endswith("found single rotations of joint 4 (rows 1-16), 6 (rows 17-31)")
 
 
-def test_an_arc_that_is_too_short_is_told_with_its_rows(arm, positions):
+def test_an_arc_that_is_too_short_is_reported_with_its_rows(arm, positions):
     q = np.concatenate([turns(6), turns(5, span=0.1)])
     with pytest.raises(DataError, match=r"joint 5 alone turns only 11\.5° .*; 20° and 5 rows are needed"):
         calibrated(arm, q, positions(q))

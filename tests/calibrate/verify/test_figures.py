@@ -98,7 +98,7 @@ def test_the_effective_diameter_takes_nine_points_and_its_own_series():
     assert not found.complete
 
 
-def test_without_a_limit_nothing_is_judged_and_without_data_nothing_is_told():
+def test_without_a_limit_nothing_is_judged_and_without_data_nothing_is_reported():
     figures = standards.iso10360_12_figures(holding(seats={1: SHIFTS}, mpe=PermissibleErrors()))
     judgements = {figure.symbol: figure.judgement for figure in figures}
     assert judgements["L_Dia at a seat"] is Judgement.NOT_STATED

@@ -78,7 +78,7 @@ def test_a_picture_is_of_now(emulation: Emulation, kind: str) -> None:
         camera.close()
 
 
-def test_what_was_still_on_its_way_when_it_was_asked_is_not_believed(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_was_still_on_its_way_when_it_was_asked_is_not_trusted(monkeypatch: pytest.MonkeyPatch) -> None:
     """Frames come a tenth of a second apart, and are numbered; the camera holds five back."""
 
     class Line:

@@ -159,7 +159,7 @@ def scripted(frames: list[tuple[float, can.Message]], names: list[str]) -> CanDb
     return CanDbcEncoders(lambda: bus, joint_signals(PLAIN, names, None), clock=clock)
 
 
-def test_a_reading_that_is_missing_is_nan_and_ages_are_told():
+def test_a_reading_that_is_missing_is_nan_and_ages_are_reported():
     frames = [(5.0, angle_frame(1, 0)), (5.001, angle_frame(2, 0))]
     frames += [(5.01, angle_frame(1, 1 << 14)), (5.013, angle_frame(2, 1 << 14))]
     frames += [(5.02, angle_frame(1, 1 << 14)), (5.03, angle_frame(1, 1 << 14)), (5.031, angle_frame(2, 1 << 14))]

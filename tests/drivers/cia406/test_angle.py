@@ -59,7 +59,7 @@ def test_a_step_faster_than_any_joint_is_no_motion():
     assert angle.follow(10, 0.010) == pytest.approx(10 * UNIT_RAD)
 
 
-def test_a_lasting_step_is_a_slip_and_told_from_there_on():
+def test_a_lasting_step_is_a_slip_and_distinguished_from_there_on():
     angle = ContinuousAngle(MULTI_TURN, speed_limit_rad_s=10.0)
     angle.follow(0, 0.0)
     assert math.isnan(angle.follow(TURN // 2, 0.1))

@@ -127,7 +127,7 @@ def test_second_and_unasked_answers_are_late(cycle):
     assert cycle.late_answers == 2
 
 
-def test_silence_is_counted_from_the_first_unanswered_sync_and_told_once(cycle):
+def test_silence_is_counted_from_the_first_unanswered_sync_and_reported_once(cycle):
     cycle.sent(10.0)
     cycle.answer(0, 1.0, 10.001)
     cycle.give_up(10.0 + ANSWER_LIMIT_S)

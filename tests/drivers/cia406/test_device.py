@@ -121,9 +121,9 @@ def test_a_lost_answer_is_nan_for_that_node_only(memory):
     blocks = [memory.encoders.read(1.0) for _ in range(10)]
     position_rad = np.concatenate([block.values["position_rad"] for block in blocks])
     assert np.isfinite(position_rad[:, 0]).all()
-    in_doubt = np.flatnonzero(np.isnan(position_rad[:, 1]))
-    assert 2 <= in_doubt.size <= HOLD_S * 100.0 + 2.0  # until the bus has come to rest, and the next
-    np.testing.assert_array_equal(in_doubt, in_doubt[0] + np.arange(in_doubt.size))
+    uncertain = np.flatnonzero(np.isnan(position_rad[:, 1]))
+    assert 2 <= uncertain.size <= HOLD_S * 100.0 + 2.0  # until the bus has come to rest, and the next
+    np.testing.assert_array_equal(uncertain, uncertain[0] + np.arange(uncertain.size))
     assert np.isfinite(position_rad[-1]).all()
 
 
@@ -139,7 +139,7 @@ def test_a_node_silent_for_half_a_second_is_named_with_the_remedy(memory):
     assert np.isfinite(memory.encoders.read(1.0).values["position_rad"][-1, 0])
 
 
-def test_a_node_whose_heartbeat_goes_on_is_not_told_to_check_its_power(memory):
+def test_a_node_whose_heartbeat_goes_on_is_not_asked_to_check_its_power(memory):
     memory.encoders.connect()
     memory.encoders.read(1.0)
     memory.bus.lose = lambda frame: frame.id == 0x282

@@ -245,7 +245,7 @@ def test_bus_off_is_lost_with_what_went_before(memory):
         memory.encoders.read(1.0)
 
 
-def test_an_adapter_that_says_it_is_bus_off_is_believed(memory):
+def test_an_adapter_that_says_it_is_bus_off_is_trusted(memory):
     memory.encoders.connect()
     memory.encoders.read(1.0)
     memory.bus.said = can.BusState.ERROR
@@ -257,7 +257,7 @@ def test_an_adapter_that_says_it_is_bus_off_is_believed(memory):
 # --- encoders
 
 
-def test_a_slip_is_recorded_and_the_position_told_as_it_is(memory):
+def test_a_slip_is_recorded_and_the_position_reported_as_it_is(memory):
     slipping = Cia406Encoders(lambda: memory.bus, [1, 2], 100.0, clock=memory.clock, acceleration_limit_rad_s2=20.0)
     slipping.connect()
     before = slipping.read(1.0)

@@ -176,7 +176,7 @@ def test_a_dropped_line_is_lost_and_connects_anew(cell, arm) -> None:
     arm.move_joints(HOME, 2.0, 10.0)
 
 
-def test_a_map_that_does_not_fit_is_told_when_connecting(cell) -> None:
+def test_a_map_that_does_not_fit_is_reported_when_connecting(cell) -> None:
     if cell.device.host is None:
         return
     line = ModbusLine(TcpAddress(cell.device.host, cell.device.port))

@@ -73,7 +73,7 @@ def test_neighbours_are_read_together() -> None:
     assert found.requests(list(found.registers)) == (Request("holding", 0, 24), Request("holding", 300, 1))
 
 
-def test_gaps_are_read_across_only_where_told() -> None:
+def test_gaps_are_read_across_only_where_stated() -> None:
     entries = [joints(), Register("life", 20, "uint16")]
     names = ["actual_q_rad", "life"]
     assert len(RegisterMap(entries).requests(names)) == 2

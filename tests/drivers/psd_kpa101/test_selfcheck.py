@@ -52,7 +52,7 @@ def test_places_that_do_not_tell_give_no_number(counts_at):
     assert check_unit(along_x, counts, HALF_M).status is CheckStatus.NOT_MOVED
 
 
-def test_noise_shows_as_doubt():
+def test_noise_shows_as_uncertainty():
     rng = np.random.default_rng(4)
     true = np.column_stack([-PLACES_M[:, 0] / HALF_M * 4.0 / 10 * 32767, PLACES_M[:, 1] / HALF_M * 4.0 / 10 * 32767])
     counts = np.column_stack([true, np.full(9, 4.0 / 10 * 65535)])

@@ -208,7 +208,7 @@ def test_a_dropped_connection_is_lost_and_connect_finds_it_again() -> None:
             site.tracker.read(0.1)
 
 
-def test_nobody_there_is_told_with_the_address() -> None:
+def test_nobody_there_is_reported_with_the_address() -> None:
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
     nobody = msgspec.convert({**ASCII, "port": port}, TrackerDevice)

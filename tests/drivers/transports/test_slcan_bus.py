@@ -78,7 +78,7 @@ def heard(bus: can.BusABC, count: int) -> list[tuple[int, bool, bytes]]:
     return [(m.arbitration_id, m.is_extended_id, bytes(m.data)) for m in found if m is not None]
 
 
-def test_all_kinds_of_frames_are_told_in_order(adapter: Adapter) -> None:
+def test_all_kinds_of_frames_are_reported_in_order(adapter: Adapter) -> None:
     adapter.says(LINES)
     assert heard(adapter.bus, len(FRAMES)) == FRAMES
     assert adapter.bus.recv(0.0) is None
@@ -141,7 +141,7 @@ def send_while_it_takes(bus: can.BusABC, message: can.Message, sent: Iterator[in
         assert next(sent) < 10_000
 
 
-def test_an_adapter_that_takes_nothing_more_is_told_in_time_and_no_frame_is_torn(adapter: Adapter) -> None:
+def test_an_adapter_that_takes_nothing_more_is_reported_in_time_and_no_frame_is_torn(adapter: Adapter) -> None:
     adapter.hears_until(b"O\rO\r")  # how the adapter was opened
     message, sent = can.Message(arbitration_id=0x281, data=bytes(8), is_extended_id=False), itertools.count()
     with pytest.raises(can.CanOperationError, match="Could not write"):

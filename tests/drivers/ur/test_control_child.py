@@ -108,7 +108,7 @@ def test_a_call_that_was_sent_after_the_stop_runs(child) -> None:
     assert child.calls.next_answer(1.0) == Ended(Outcome.DONE)
 
 
-def test_a_silent_controller_is_told_before_braking_which_may_wait_for_it(child) -> None:
+def test_a_silent_controller_is_reported_before_braking_which_may_wait_for_it(child) -> None:
     child.silent = True
     child.stops.send(Stop(5.0))
     child.turn()

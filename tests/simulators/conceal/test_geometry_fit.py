@@ -19,11 +19,11 @@ def left_over_rms(case: Case) -> float:
     def predict(rig: TrueRig) -> np.ndarray:
         wire = case.wanted.family == "wire"
         values_m = observe(rig, case.table.scene, (), case.reading_rad, wire=wire).values_m
-        return np.concatenate((values_m.ravel() / case.sigma_m, in_sigmas(rig, case.belief.distances)))
+        return np.concatenate((values_m.ravel() / case.sigma_m, in_sigmas(rig, case.stated.distances)))
 
-    lengths = [one.length_m / one.sigma_m for one in case.belief.distances]
+    lengths = [one.length_m / one.sigma_m for one in case.stated.distances]
     measured = np.concatenate((case.values_m.ravel() / case.sigma_m, lengths))
-    rig, rank = case.drawn.believed, 0
+    rig, rank = case.drawn.nominal, 0
     for _ in range(ROUNDS):
         deviations = list_deviations(rig, case.drawn.spread)
         slope = np.stack(

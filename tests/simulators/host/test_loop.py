@@ -65,7 +65,7 @@ def test_world_that_ran_before_goes_on_from_its_time(stage):
     assert on.diary.calls[:2] == [("before", 5 * TICK_S), ("advance", 6 * TICK_S)]
 
 
-def test_run_ends_when_it_is_told(stage):
+def test_run_ends_when_it_is_asked(stage):
     on = stage()
     on.host.run(lambda: on.host.ticks >= 1)
     assert on.host.ticks == 1

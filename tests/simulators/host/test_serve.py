@@ -118,7 +118,7 @@ def test_everything_is_announced_reachable_and_cleaned_up(served, tmp_path: Path
     assert list((tmp_path / "links").iterdir()) == []
 
 
-def test_seed_of_the_rig_holds_unless_told_otherwise(served, tmp_path: Path):
+def test_seed_of_the_rig_holds_unless_stated_otherwise(served, tmp_path: Path):
     served(truth_path=str(tmp_path / "truth.json"))
     rig = tomllib.loads(RIG % {"folder": tmp_path})
     assert read_truth(tmp_path / "truth.json") == truth_of(rig, 3)

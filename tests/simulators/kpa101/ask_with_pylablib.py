@@ -19,7 +19,7 @@ try:
     began_s = time.monotonic()
     readings = [unit.get_readings() for _ in range(50)]
     elapsed_s = time.monotonic() - began_s
-    told = {
+    answers = {
         "info": {"serial_no": info.serial_no, "model_no": info.model_no, "fw_ver": info.fw_ver},
         "readings": readings[-1]._asdict(),
         "rate_hz": 50 / elapsed_s,
@@ -32,4 +32,4 @@ try:
     }
 finally:
     unit.close()
-print(json.dumps(told))
+print(json.dumps(answers))

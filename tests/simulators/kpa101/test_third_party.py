@@ -12,7 +12,7 @@ SCRIPT = Path(__file__).with_name("ask_with_pylablib.py")
 
 
 @pytest.fixture
-def told(served) -> dict:
+def answers(served) -> dict:
     if not CLIENTS.exists():
         pytest.skip("no environment for third-party clients: make clients")
     command = [str(CLIENTS), "-E", str(SCRIPT), served.host, str(served.port)]
@@ -21,9 +21,9 @@ def told(served) -> dict:
     return json.loads(found.stdout.splitlines()[-1])
 
 
-def test_pylablib_reads_and_sets_everything(told):
-    assert told["info"] == {"serial_no": 69250001, "model_no": "KPA101", "fw_ver": "1.0.7"}
-    assert told["readings"] == pytest.approx(
+def test_pylablib_reads_and_sets_everything(answers):
+    assert answers["info"] == {"serial_no": 69250001, "model_no": "KPA101", "fw_ver": "1.0.7"}
+    assert answers["readings"] == pytest.approx(
         {
             "xdiff": 3.0,  # it turns x round, and so did the unit
             "ydiff": -1.0,
@@ -33,8 +33,8 @@ def test_pylablib_reads_and_sets_everything(told):
         },
         abs=0.001,
     )
-    assert (told["mode"], told["open"], told["monitor"]) == ("monitor", "open_loop", "monitor")
-    assert told["output"] == pytest.approx({"xpos": -1.5, "ypos": -2.5}, abs=0.001)  # its own set and get disagree
-    assert told["pid"]["p"] == pytest.approx(0.25, abs=1e-4)
-    assert told["parameters"]["route"] == "sma_only"
-    assert told["rate_hz"] < 400.0  # a reply takes 1.6 ms on the line, and pylablib waits 3 ms after every write
+    assert (answers["mode"], answers["open"], answers["monitor"]) == ("monitor", "open_loop", "monitor")
+    assert answers["output"] == pytest.approx({"xpos": -1.5, "ypos": -2.5}, abs=0.001)  # its own set and get disagree
+    assert answers["pid"]["p"] == pytest.approx(0.25, abs=1e-4)
+    assert answers["parameters"]["route"] == "sma_only"
+    assert answers["rate_hz"] < 400.0  # a reply takes 1.6 ms on the line, and pylablib waits 3 ms after every write

@@ -57,7 +57,7 @@ def test_the_way_from_power_off_to_running(bench) -> None:
     assert ask(bench, "robotmode") == "Robotmode: RUNNING"
 
 
-def test_a_protective_stop_refuses_the_unlock_as_long_as_it_was_told_to(bench) -> None:
+def test_a_protective_stop_refuses_the_unlock_as_long_as_it_was_asked_to(bench) -> None:
     bench.arm.power.unlock_delay_s = 5.0
     bench.run(0.1)
     bench.arm.protective_stop()

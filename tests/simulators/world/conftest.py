@@ -50,7 +50,7 @@ def ur5e() -> Callable[..., dict[str, Any]]:
 
 
 @pytest.fixture
-def drawn_as_believed() -> dict[str, float]:
+def no_deviation() -> dict[str, float]:
     """Deviations of the size that the example rig emulates."""
     return {
         "length_sigma_m": 3e-4,

@@ -33,8 +33,8 @@ def product_of_dh(world: World, true_rad: np.ndarray) -> np.ndarray:
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_flange_of_the_true_arm_is_the_product_of_its_true_links(ur5e, drawn_as_believed, seed):
-    rig = ur5e(**drawn_as_believed)
+def test_flange_of_the_true_arm_is_the_product_of_its_true_links(ur5e, no_deviation, seed):
+    rig = ur5e(**no_deviation)
     for number, joint in enumerate(rig["arm"]["joint"]):
         joint["theta_offset_rad"] = 0.1 * number
     q_rad = np.random.default_rng(seed).uniform(-3.0, 3.0, 6)
@@ -57,8 +57,8 @@ def test_link_encoders_see_the_true_angle_from_their_own_mounting(ur5e):
     assert np.ptp(offset_rad) > 0.1
 
 
-def test_beam_leaves_the_flange_where_the_laser_truly_sits(ur5e, drawn_as_believed):
-    world = World.from_rig(ur5e(**drawn_as_believed), q_rad=[0.3, -1.2, 1.1, 0.4, -0.7, 0.9])
+def test_beam_leaves_the_flange_where_the_laser_truly_sits(ur5e, no_deviation):
+    world = World.from_rig(ur5e(**no_deviation), q_rad=[0.3, -1.2, 1.1, 0.4, -0.7, 0.9])
     pose, beam, truth = world.T_base_flange(), world.beam(), world.truth
     np.testing.assert_allclose(beam[:3], pose[:3, :3] @ truth.laser_origin_m + pose[:3, 3], atol=1e-12)
     np.testing.assert_allclose(beam[3:], pose[:3, :3] @ truth.laser_direction, atol=1e-12)

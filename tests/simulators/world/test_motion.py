@@ -37,8 +37,8 @@ def follow(world: World, goal_rad: np.ndarray) -> float:
     return worst_rad
 
 
-def test_smooth_motion_is_followed_and_settles_within_a_tenth_of_a_second(ur5e, drawn_as_believed):
-    world = World.from_rig(ur5e(**drawn_as_believed))
+def test_smooth_motion_is_followed_and_settles_within_a_tenth_of_a_second(ur5e, no_deviation):
+    world = World.from_rig(ur5e(**no_deviation))
     assert follow(world, BENT) < 2e-3  # one millisecond of interpolation at 1 rad/s, and as much again for turns
     world.advance(world.time_s + 0.1)
     assert np.abs(world.joints().q_rad - BENT).max() < 1e-6
@@ -76,7 +76,7 @@ def test_arm_hangs_without_torque_when_there_is_no_gravity(ur5e):
     np.testing.assert_allclose(World.from_rig(rig, q_rad=BENT).joints().torque_nm, 0.0, atol=1e-12)
 
 
-def test_wild_jumps_do_not_blow_up_and_end_where_they_were_sent(ur5e):
+def test_large_jumps_do_not_blow_up_and_end_where_they_were_sent(ur5e):
     world = World.from_rig(ur5e())
     rng = np.random.default_rng(3)
     for _ in range(50):
@@ -99,9 +99,9 @@ def test_encoder_counts_quantise_what_the_controller_reads(ur5e):
     assert q_rad[0] == pytest.approx(BENT[0], abs=1e-15)
 
 
-def test_skipping_physics_at_rest_changes_nothing(ur5e, drawn_as_believed):
+def test_skipping_physics_at_rest_changes_nothing(ur5e, no_deviation):
     """An arm that stands is where it would be had the physics gone on."""
-    world = World.from_rig(ur5e(**drawn_as_believed))
+    world = World.from_rig(ur5e(**no_deviation))
     follow(world, BENT)
     while not world.stands:
         world.advance(world.time_s + TICK_S)

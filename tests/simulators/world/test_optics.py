@@ -39,7 +39,7 @@ def test_the_other_way_round_the_wall_is_struck_first():
     assert spots.psd1 == pytest.approx((0.0, 0.0, REFLECTIVITY * (1.0 - REFLECTIVITY)), abs=1e-15)
 
 
-def test_beam_beside_a_face_gives_no_light():
+def test_beam_off_a_face_gives_no_light():
     spots = trace(Ray(0.0101, -0.2, 0.2, 0.0, ROOT, -ROOT), (FLOOR, WALL))
     assert (spots.psd1, spots.psd2, spots.first) == (None, None, 0)
 

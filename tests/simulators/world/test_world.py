@@ -93,8 +93,8 @@ def test_fixture_moved_in_the_light_is_dark_from_then_on(ur5e):
     assert world.photocurrents_a([0.014])[0, 0] > 1e-5
 
 
-def test_two_seeds_are_two_worlds_and_one_seed_is_one(ur5e, drawn_as_believed):
-    rig = ur5e(**drawn_as_believed)
+def test_two_seeds_are_two_worlds_and_one_seed_is_one(ur5e, no_deviation):
+    rig = ur5e(**no_deviation)
     assert truth_of(rig, 1) == truth_of(rig, 1)
     assert truth_of(rig, 1).joint_zero_rad != truth_of(rig, 2).joint_zero_rad
     assert World.from_rig(rig).truth == truth_of(rig, 7)
@@ -106,9 +106,9 @@ def test_seed_below_zero_is_refused(ur5e):
         World.from_rig(ur5e(), seed=-1)
 
 
-def test_switching_one_deviation_off_leaves_the_others(ur5e, drawn_as_believed):
-    whole = truth_of(ur5e(**drawn_as_believed), 1)
-    straight = truth_of(ur5e(**{**drawn_as_believed, "angle_sigma_rad": 0.0}), 1)
+def test_switching_one_deviation_off_leaves_the_others(ur5e, no_deviation):
+    whole = truth_of(ur5e(**no_deviation), 1)
+    straight = truth_of(ur5e(**{**no_deviation, "angle_sigma_rad": 0.0}), 1)
     assert [link.beta_rad for link in straight.links] == [0.0] * 6
     assert [link.a_m for link in straight.links] == [link.a_m for link in whole.links]
     assert (straight.joint_zero_rad, straight.placements) == (whole.joint_zero_rad, whole.placements)
@@ -131,8 +131,8 @@ def test_without_deviations_the_truth_is_the_drawing(ur5e):
         assert place.psd1_in_base.rotation_rad == pytest.approx(drawn["psd1_in_base"]["rotation_rad"])
 
 
-def test_deviations_have_the_sizes_that_the_rig_states(ur5e, drawn_as_believed):
-    rig = ur5e(**drawn_as_believed)
+def test_deviations_have_the_sizes_that_the_rig_states(ur5e, no_deviation):
+    rig = ur5e(**no_deviation)
     truths = [truth_of(rig, seed) for seed in range(300)]
     a_m = np.array([[link.a_m for link in t.links] for t in truths]) - [j["a_m"] for j in rig["arm"]["joint"]]
     assert a_m.std() == pytest.approx(3e-4, rel=4 / np.sqrt(2 * a_m.size))
@@ -146,8 +146,8 @@ def test_deviations_have_the_sizes_that_the_rig_states(ur5e, drawn_as_believed):
     assert shift_m.std() == pytest.approx(3e-3, rel=4 / np.sqrt(2 * shift_m.size))
 
 
-def test_truth_survives_its_file(ur5e, drawn_as_believed, tmp_path: Path):
-    truth = truth_of(ur5e(**drawn_as_believed), 4)
+def test_truth_survives_its_file(ur5e, no_deviation, tmp_path: Path):
+    truth = truth_of(ur5e(**no_deviation), 4)
     write_truth(truth, tmp_path / "aside" / "truth.json")
     assert read_truth(tmp_path / "aside" / "truth.json") == truth
 

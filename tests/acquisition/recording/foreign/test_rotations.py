@@ -61,7 +61,7 @@ def test_tiny_rotations_keep_their_digits():
     np.testing.assert_allclose(rotations.of_abc(vector), vector[:, ::-1], rtol=1e-8)
 
 
-def test_no_rotations_are_told_from_rotations():
+def test_no_rotations_are_distinguished_from_rotations():
     good = Rotation.random(3, random_state=1)
     matrix, quaternion = good.as_matrix().reshape(-1, 9), good.as_quat()
     assert not rotations.bad_matrix(matrix).any()

@@ -175,9 +175,9 @@ def test_what_was_understood_reads_the_table_again(tmp_path, rig_source):
     headings = [f"A{i} [deg]" for i in range(1, 7)] + ["X/mm", "Y/mm", "Z/mm"]
     path = write_csv(tmp_path / "lab.csv", headings, table_of(given, "deg", "mm"))
     table, samples = imported(path, rig_source)
-    beside = write_session(table, samples, columns_file(table, samples, "test"), tmp_path / "session")
-    about = json.loads(beside.read_text())
-    assert beside == tmp_path / "session.columns.json"
+    columns_path = write_session(table, samples, columns_file(table, samples, "test"), tmp_path / "session")
+    about = json.loads(columns_path.read_text())
+    assert columns_path == tmp_path / "session.columns.json"
     assert about["columns"][0]["becomes"] == [f"q{i}_rad" for i in range(1, 7)]
     again = imported(path, rig_source, about["stated"])[1]
     close(again, given)
@@ -349,7 +349,7 @@ def refused_by(call):
     return str(error.value)
 
 
-def test_a_stated_unit_is_believed(tmp_path, rig_source):
+def test_a_stated_unit_is_trusted(tmp_path, rig_source):
     given = session()
     headings = [f"A{i}" for i in range(1, 7)] + ["X", "Y", "Z"]
     path = write_csv(tmp_path / "lab.csv", headings, table_of(given, "deg", "mm"))

@@ -35,10 +35,10 @@ def corrected(request, tmp_path_factory):
     model, poses, out = (str(folder / name) for name in ("model.json", "poses.csv", "corrected.csv"))
     diagnosed = ["diagnose", str(folder / "recording"), "--out", str(folder / "diagnosis.json")]
     assert run([*diagnosed, "--model-out", model]) == 0
-    believed = case.drawn.believed
-    q = free_poses(believed.arm, POSES, np.random.default_rng(5))
-    T = forward(believed.arm, q + believed.arm.zero_rad).flange
-    wanted_m = T[:, :3, 3] + T[:, :3, :3] @ believed.tool_point_m
+    nominal = case.drawn.nominal
+    q = free_poses(nominal.arm, POSES, np.random.default_rng(5))
+    T = forward(nominal.arm, q + nominal.arm.zero_rad).flange
+    wanted_m = T[:, :3, 3] + T[:, :3, :3] @ nominal.tool_point_m
     table = np.concatenate([wanted_m, Rotation.from_matrix(T[:, :3, :3]).as_rotvec(), q], axis=1)
     joints = [f"q{j + 1}_rad" for j in range(6)]
     with (folder / "poses.csv").open("w") as file:

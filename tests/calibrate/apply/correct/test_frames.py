@@ -36,7 +36,7 @@ def test_a_frame_is_where_the_touched_points_have_it():
     assert np.all((found.sigma > 0.0) & (found.sigma < 1e-3))
 
 
-def test_a_point_that_lies_elsewhere_is_named_and_two_points_are_too_few():
+def test_a_point_that_lies_at_another_place_is_named_and_two_points_are_too_few():
     points = touched()
     points[2] += [0.0, 0.0, 0.05]
     with pytest.raises(DataError, match="point 3"):

@@ -212,7 +212,7 @@ def test_a_make_that_is_not_stated_is_asked_for(tmp_path, capsys):
     assert 'state make = "fanuc" under [arm]' in " ".join(capsys.readouterr().err.split())
 
 
-def test_the_command_writes_beside_the_model(tmp_path, capsys):
+def test_the_command_writes_next_to_the_model(tmp_path, capsys):
     write_model(tmp_path / "model.json", model())
     assert run(["export-model", str(tmp_path / "model.json"), "--to", "json"]) == 0
     assert "json: " in capsys.readouterr().out

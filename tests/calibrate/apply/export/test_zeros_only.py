@@ -92,7 +92,7 @@ def test_the_table_of_a_whole_model_names_the_command_that_fills_it(tmp_path, ca
     assert sum("calibeam identify REC --zeros-only" in line for line in comments) == 1
 
 
-def test_a_plan_of_ones_own_is_refused_beside_zeros_only(tmp_path, capsys):
+def test_a_plan_of_ones_own_is_refused_with_zeros_only(tmp_path, capsys):
     folder, plan = tracked(tmp_path / "session", "kuka-kr6-r900", rows=8), tmp_path / "fit.toml"
     plan.write_text("schema = 1\n")
     words = ["identify", str(folder), "--zeros-only", "--plan", str(plan), "--out", str(tmp_path / "zeros.json")]

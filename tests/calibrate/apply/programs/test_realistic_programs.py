@@ -277,7 +277,7 @@ def test_overshoots_stand_within_the_branch_of_an_if():
     assert [k for k, line in enumerate(added) if "MoveAbsJ" in line] == [1, 4, 7, 11]
 
 
-def test_overshoots_stand_before_lines_beside_a_spline():
+def test_overshoots_stand_before_lines_next_to_a_spline():
     text = f"BAS(#BASE, 0)\nSPLINE\nSLIN XP9\nENDSPLINE\nLIN {kuka(0)} ; CIRC comes next\nCIRC XP7, XP8\n"
     done = corrected(text, ".src", approach=1)
     assert done.text.splitlines()[4].startswith("PTP {A1")

@@ -29,7 +29,7 @@ def settled(session, term, rng):
 @pytest.mark.parametrize(
     "more", [{"depends_on": ("approach2", "q1")}, {"order": 4}], ids=["another driver", "higher harmonic"]
 )
-def test_of_two_names_with_the_same_columns_the_simpler_is_told_and_the_other_is_its_rival(world, more):
+def test_of_two_names_with_the_same_columns_the_simpler_is_reported_and_the_other_is_its_rival(world, more):
     rng = np.random.default_rng(1)
     session = world.session(rng, [(world.at_joint(2, lambda d: d.approach[:, 1]), 1.5)])
     simple = named(session, "joint2.angle", "backlash")
@@ -70,11 +70,11 @@ def test_time_and_a_temperature_that_follows_it_are_rivals_of_each_other(world):
     terms = (*(t for t in session.terms if t.depends_on != ("fan",)), by_warmth)
     for first in (by_time, by_warmth):
         _, at, rivals = settled(replace(session, terms=terms), first, np.random.default_rng(0))
-        told = {at.state.accepted[0].term.key, *(r.term.key for r in rivals[0])}
-        assert {by_time.key, by_warmth.key} <= told
+        keys = {at.state.accepted[0].term.key, *(r.term.key for r in rivals[0])}
+        assert {by_time.key, by_warmth.key} <= keys
 
 
-def believed(world, *rivals):
+def named_by(world, *rivals):
     """(1 + rival,) of a finding joint-compliance; `rivals` as physics, margin, whether a machine could be so."""
     session = world.session(np.random.default_rng(5), [])
     own = replace(named(session, "joint2.angle", "encoder-eccentricity"), physics="joint-compliance")
@@ -86,14 +86,14 @@ def believed(world, *rivals):
 
 
 def test_the_first_name_is_never_less_likely_than_another(world):
-    own, better = believed(world, ("backlash", -1.5, True))
+    own, better = named_by(world, ("backlash", -1.5, True))
     assert own == better == 0.5
-    own, better = believed(world, ("backlash", -9.0, False))
+    own, better = named_by(world, ("backlash", -9.0, False))
     assert own == better < 0.05
 
 
 def test_of_names_that_fit_alike_the_softer_part_is_likelier(world):
-    joint, base, link, tool = believed(
+    joint, base, link, tool = named_by(
         world, ("base-compliance", 0.0, True), ("link-bending", 0.0, True), ("tool-sag", 0.0, True)
     )
     assert joint == pytest.approx(2.0 * base)

@@ -10,7 +10,7 @@ from calibrate.diagnose.state.session import session_of
 from tests.calibrate.diagnose.concealed import recording_of
 
 
-def test_doubt_about_the_frames_of_base_and_tool_is_no_doubt_about_the_arm(tmp_path):
+def test_uncertainty_about_the_frames_of_base_and_tool_is_no_uncertainty_about_the_arm(tmp_path):
     """No tolerance says where they are; a cause at a joint must not bring that into the arm's error."""
     wanted = {"seed": 903, "samples": 160, "defects": ("encoder-eccentricity",), "enr": 1.5}
     recording = recording_of(tmp_path, family="tracker", **wanted)

@@ -10,7 +10,7 @@ from calibrate.diagnose.assess.diagnosis import (
     Named,
     RivalName,
 )
-from calibrate.diagnose.assess.missing_columns import doubtful, suspects, untold
+from calibrate.diagnose.assess.missing_columns import drift_not_determined, not_final_drift, suspects
 from calibrate.model.effects.term import Missing
 
 WARMTH = (Missing("temp", "temp_<where>_degC", "link-thermal-growth"),)
@@ -28,14 +28,14 @@ def columns(finding, missing):
 
 def test_a_drift_may_follow_a_temperature_that_was_not_recorded():
     assert columns(found("base.pose", "base-moved"), WARMTH) == ("temp_room_degC",)
-    assert doubtful(found("base.pose", "base-moved")).confidence == pytest.approx(NOT_FINAL)
+    assert not_final_drift(found("base.pose", "base-moved")).confidence == pytest.approx(NOT_FINAL)
 
 
 def test_what_makes_a_name_less_sure_makes_no_alternative_likelier_than_it():
     other = RivalName(Named("device.pose", ("t",), "exponential", None, "device-drift"), 0.4, 0.1, refitted=True)
     finding = replace(found("base.pose", "base-moved"), confidence=0.6, rivals=(other,))
-    (less,) = doubtful(finding).rivals
-    assert doubtful(finding).confidence == pytest.approx(NOT_FINAL)
+    (less,) = not_final_drift(finding).rivals
+    assert not_final_drift(finding).confidence == pytest.approx(NOT_FINAL)
     assert less.confidence == pytest.approx(0.4 * NOT_FINAL / 0.6)
 
 
@@ -44,19 +44,19 @@ def test_what_does_not_drift_follows_no_temperature():
     assert columns(found("fixture.pose", "fixture-moved", "step"), WARMTH) == ()
 
 
-def test_beside_thermometers_a_drift_is_none_of_warmth():
+def test_with_thermometers_a_drift_is_none_of_warmth():
     assert columns(found("base.pose", "base-moved"), PAYLOAD) == ()
 
 
 def test_an_unknown_drift_stays_as_sure_as_it_was_and_may_be_a_load():
     drift = found("link2.tilt", "unknown", "smooth", ("temp_room",))
-    assert doubtful(drift).confidence == pytest.approx(0.98)
+    assert not_final_drift(drift).confidence == pytest.approx(0.98)
     assert columns(drift, PAYLOAD) == ("payload_kg",)
     assert columns(found("joint2.angle", "unknown", "smooth", ("q2",)), PAYLOAD) == ()
 
 
 @pytest.mark.parametrize(
-    ("where", "told"),
+    ("where", "columns_named"),
     [
         ("link2.length", ("temp_link2_degC", "temp_room_degC")),
         ("joint3.angle", ("temp_link3_degC", "temp_room_degC")),
@@ -64,7 +64,7 @@ def test_an_unknown_drift_stays_as_sure_as_it_was_and_may_be_a_load():
         ("fixture.pose", ("temp_room_degC",)),
     ],
 )
-def test_the_thermometer_that_would_tell_is_named_with_its_column(where, told):
+def test_the_thermometer_that_would_tell_is_named_with_its_column(where, columns_named):
     drift = found(where, "unknown", "smooth")
-    assert columns(drift, WARMTH) == told
-    assert all(column in untold(drift, suspects(drift.name, WARMTH)).why for column in told)
+    assert columns(drift, WARMTH) == columns_named
+    assert all(column in drift_not_determined(drift, suspects(drift.name, WARMTH)).why for column in columns_named)

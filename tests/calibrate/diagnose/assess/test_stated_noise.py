@@ -27,15 +27,15 @@ def stating(folder, times=1.0, *, stated=True, **wanted):
     """A recording whose rig states the true noise over `times`, or none."""
     case = conceal(Wanted(**{**SESSION, **wanted}))
     noise = {"position_m": case.sigma_m / times} if stated else {}
-    write_case(replace(case, belief=replace(case.belief, noise=noise)), folder)
+    write_case(replace(case, stated=replace(case.stated, noise=noise)), folder)
     return read(folder / "recording")
 
 
-def found(folder, times=1.0, *, stated=True, elsewhere=False, **wanted):
+def found(folder, times=1.0, *, stated=True, unnamed=False, **wanted):
     """The noise of one instrument; the rig file states the true one over `times`. The truth stays outside."""
     recording = stating(folder, times, stated=stated, **wanted)
     model = fit_geometry(session_of(recording.rig, recording.samples))
-    (one,) = noise_found(model, np.random.default_rng(1), elsewhere=elsewhere)
+    (one,) = noise_found(model, np.random.default_rng(1), unnamed=unnamed)
     return one
 
 
@@ -55,8 +55,8 @@ def test_a_wrong_statement_is_said_with_what_supports_it(tmp_path):
     assert not one.opposes
 
 
-def test_structure_elsewhere_is_no_wrong_statement(tmp_path):
-    assert found(tmp_path, times=2.1, seed=3, elsewhere=True).statement is Statement.EXCEEDED
+def test_structure_at_another_place_is_no_wrong_statement(tmp_path):
+    assert found(tmp_path, times=2.1, seed=3, unnamed=True).statement is Statement.EXCEEDED
 
 
 def test_no_statement_is_no_noise(tmp_path):
@@ -81,7 +81,7 @@ def test_joints_that_come_back_a_little_off_are_named_by_what_to_state(tmp_path)
     recording = stating(tmp_path, seed=3)
     q = {f"q{j}_rad": recording.samples.column(f"q{j}_rad") + back_rad * rng.standard_normal(120) for j in range(1, 7)}
     model = fit_geometry(session_of(recording.rig, changed(recording.samples, **q)))
-    (one,) = noise_found(model, rng, elsewhere=False)
+    (one,) = noise_found(model, rng, unnamed=False)
     assert one.statement is Statement.EXCEEDED
     (words,) = [words for words in one.opposes if "levers" in words]
     assert words.endswith("state [noise] joint_rad where the arm is known to")
@@ -91,11 +91,11 @@ def test_joints_that_come_back_a_little_off_are_named_by_what_to_state(tmp_path)
 def test_what_a_row_states_of_its_own_average_is_no_claim_about_the_reading(tmp_path):
     wanted = {"family": "dual-psd", "seed": 3, "samples": 100, "arm": None}
     case = conceal(Wanted(**{**SESSION, **wanted}))
-    write_case(replace(case, belief=replace(case.belief, noise={"psd_m": case.sigma_m})), tmp_path)
+    write_case(replace(case, stated=replace(case.stated, noise={"psd_m": case.sigma_m})), tmp_path)
     recording = read(tmp_path / "recording")
     within = {f"psd{k}_{axis}_sigma_m": np.full(100, case.sigma_m / 14.0) for k in (1, 2) for axis in "xy"}
     model = fit_geometry(session_of(recording.rig, changed(recording.samples, **within)))
-    (one,) = noise_found(model, np.random.default_rng(1), elsewhere=False)
+    (one,) = noise_found(model, np.random.default_rng(1), unnamed=False)
     assert one.statement is Statement.AGREES
     assert one.stated == pytest.approx(case.sigma_m)
 

@@ -75,9 +75,9 @@ def test_names_that_balance_each_other_are_no_machine(world):
     own = {t.physics: t for t in session.candidates() if t.port.where == "joint3.angle"}
     first = Accepted(own["encoder-eccentricity"], np.array([4.0, -1.0]), np.zeros(0))
     against = Accepted(own["encoder-harmonic"], _balancing(Bench(session), first, own["encoder-harmonic"]), np.zeros(0))
-    beside = Accepted(own["backlash"], np.array([1.0]), np.zeros(0))
+    also_named = Accepted(own["backlash"], np.array([1.0]), np.zeros(0))
     assert cancel(holding(session, (first, against)), (0, 1))
-    assert not cancel(holding(session, (first, beside)), (0, 1))
+    assert not cancel(holding(session, (first, also_named)), (0, 1))
 
 
 def _balancing(bench, first, term):
@@ -178,7 +178,7 @@ def test_unseen_errors_are_those_of_leaving_rows_out(world):
     assert np.sum(found) == pytest.approx(total, rel=1e-6)
 
 
-def test_what_explains_little_beside_an_unknown_cause_is_no_final_name(world):
+def test_what_explains_little_next_to_an_unknown_cause_is_no_final_name(world):
     rng = np.random.default_rng(6)
     truth = [(world.at_joint(3, uneven), 8.0), (world.at_joint(2, lambda d: d.approach[:, 1]), 0.8)]
     said = assessed(world.session(rng, truth), rng).findings
@@ -188,7 +188,7 @@ def test_what_explains_little_beside_an_unknown_cause_is_no_final_name(world):
     assert all(f.confidence <= 0.5 for f in small)
 
 
-def test_a_curve_over_drivers_that_an_open_term_has_is_not_added_beside_it(world):
+def test_a_curve_over_drivers_that_an_open_term_has_is_not_added_next_to_it(world):
     rng = np.random.default_rng(7)
     found = with_unknowns(search(world.session(rng, [(world.at_joint(3, wavy), 4.0)]), rng))
     drivers = [a.term.depends_on for a in found.state.accepted if a.term.open and a.term.port.where == "joint3.angle"]
@@ -209,8 +209,8 @@ def test_three_functions_of_the_pose_at_one_joint_of_a_sound_machine_are_no_name
 def test_where_faults_are_everywhere_three_may_meet_at_a_joint(world):
     names = [t for t in world.session(np.random.default_rng(8)).candidates() if not t.open and "t" not in t.depends_on]
     at_3 = [t for t in names if t.port.where == "joint3.angle" and t.depends_on[0].startswith("q")][:3]
-    elsewhere = [t for t in names if t.port.where != "joint3.angle" and t.depends_on[0].startswith("approach")] * 5
-    assert pieces([Accepted(t, np.zeros(1), np.zeros(0)) for t in (*at_3, *elsewhere)], places=12) == []
+    others = [t for t in names if t.port.where != "joint3.angle" and t.depends_on[0].startswith("approach")] * 5
+    assert pieces([Accepted(t, np.zeros(1), np.zeros(0)) for t in (*at_3, *others)], places=12) == []
 
 
 def test_a_name_on_the_driver_of_an_unknown_cause_is_not_final(world):
@@ -220,9 +220,9 @@ def test_a_name_on_the_driver_of_an_unknown_cause_is_not_final(world):
     truth.append((world.at_joint(2, lambda d: np.sin(d.q_rad[:, 1] + 0.4)), 3.0))
     said = assessed(world.session(rng, truth), rng).findings
     assert said[0].name.physics == "unknown"
-    beside = [f for f in said if f.name.physics == "encoder-eccentricity"]
-    assert beside
-    assert all(f.confidence <= 0.5 for f in beside)
+    also_named = [f for f in said if f.name.physics == "encoder-eccentricity"]
+    assert also_named
+    assert all(f.confidence <= 0.5 for f in also_named)
 
 
 def weighed(joint):
@@ -256,7 +256,7 @@ def two_soft_joints(world):
         ((Missing("gravity_torque", "mass_kg", "joint-compliance"),), {"joint2.angle"}),
     ],
 )
-def test_beside_a_great_cause_by_weight_a_slight_one_is_final_only_if_all_weights_are_known(
+def test_next_to_a_great_cause_by_weight_a_slight_one_is_final_only_if_all_weights_are_known(
     world, without_masses, lacking, sure
 ):
     session, rng = two_soft_joints(world)
@@ -277,7 +277,7 @@ def test_a_weight_is_a_function_of_the_angles_of_an_unknown_cause_at_its_joint(w
     assert all(f.confidence <= 0.5 for f in said if f.name.physics == "joint-compliance")
 
 
-def test_a_slight_law_of_the_angle_beside_a_great_cause_by_weight_is_no_final_name(world, without_masses):
+def test_a_slight_law_of_the_angle_next_to_a_great_cause_by_weight_is_no_final_name(world, without_masses):
     """Weights are never stated exactly."""
     rng = np.random.default_rng(3)
     torque = {"gravity_torque2": rng.normal(size=world.samples)}

@@ -22,7 +22,7 @@ def rival(alike=False, **other):
     return RivalName(replace(GROWTH, **other), 0.3, 1.0, refitted=True, alike=alike)
 
 
-def test_rivals_of_one_name_are_told_with_what_they_follow():
+def test_rivals_of_one_name_are_reported_with_what_they_follow():
     (said,) = advice(rival(depends_on=("temp_link6",)), rival(depends_on=("t",), shape="exponential"))
     assert "link-thermal-growth at link2.length by temp_link6, link-thermal-growth at link2.length by t" in said
 
@@ -32,7 +32,7 @@ def test_what_only_the_course_of_time_parts_is_not_sent_to_other_poses():
     assert said.endswith(COOLED)
 
 
-def test_a_drift_at_another_place_is_told_by_poses():
+def test_a_drift_at_another_place_is_reported_by_poses():
     (said,) = advice(rival(where="base.pose", depends_on=("t",), physics="base-moved"))
     assert said == f"link-thermal-growth at link2.length could also be base-moved at base.pose: {POSES}"
 

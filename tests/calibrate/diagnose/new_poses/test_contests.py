@@ -7,7 +7,7 @@ import pytest
 
 from calibrate.diagnose.assess.findings import named
 from calibrate.diagnose.new_poses.contests import duel, rival_named
-from calibrate.diagnose.new_poses.longer_session import NewPoses, elsewhere
+from calibrate.diagnose.new_poses.longer_session import NewPoses, at_new_poses
 from calibrate.diagnose.new_poses.next_poses import next_poses
 from calibrate.diagnose.new_poses.reachable import reachable
 from calibrate.diagnose.search.bench import Bench
@@ -20,7 +20,7 @@ from tests.calibrate.diagnose.concealed import recording_of
 MEASURED, RANDOM = 60, 2
 
 
-def told(folder):
+def advice_of(folder):
     """What was hidden: to judge, never to diagnose."""
     return json.loads((folder / "sealed" / "truth.json").read_text())["defects"][0]
 
@@ -77,13 +77,13 @@ def poses_like(recording, measured, rest, rng):
 def test_twenty_chosen_poses_part_truth_and_rival_more_than_random_ones(seed, kind, physics, tmp_path):
     wanted = {"family": "dual-psd", "seed": seed, "defects": (kind,), "enr": 0.6, "samples": 300}
     recording, rng = recording_of(tmp_path, **wanted), np.random.default_rng(seed)
-    where = told(tmp_path)["port"]
+    where = advice_of(tmp_path)["port"]
     order = rng.permutation(len(recording.samples))
     measured, rest = np.sort(order[:MEASURED]), np.sort(order[MEASURED:])
     state = fit_geometry(session_of(recording.rig, recording.samples.take(measured)))
     state = with_term(state, physics, where)
     rival = nearest_rival(state)
-    there = elsewhere(state, poses_like(recording, measured, rest, rng))
+    there = at_new_poses(state, poses_like(recording, measured, rest, rng))
     chosen = rest[next_poses([duel(there, 0, rival)]).poses]
     truth = state.accepted[0]
     by_chance = [
@@ -98,7 +98,7 @@ def test_poses_that_could_be_taken_land_where_the_model_sees_them(tmp_path):
     recording = recording_of(tmp_path, family="dual-psd", seed=51, samples=80)
     state = fit_geometry(session_of(recording.rig, recording.samples))
     offered = reachable(state, np.random.default_rng(1), 100)
-    there = elsewhere(state, offered)
+    there = at_new_poses(state, offered)
     spots_m = there.around.expected[0][len(recording.samples) :]
     assert len(offered) > 60
     assert np.max(np.abs(spots_m)) < recording.rig.fixture.half_size_m
@@ -110,7 +110,7 @@ def test_poses_that_could_be_taken_land_where_the_model_sees_them(tmp_path):
 def test_a_probe_stays_in_its_cone(tmp_path):
     recording = recording_of(tmp_path, family="cones", seed=52, samples=80)
     state = fit_geometry(session_of(recording.rig, recording.samples))
-    there = elsewhere(state, reachable(state, np.random.default_rng(1), 60))
+    there = at_new_poses(state, reachable(state, np.random.default_rng(1), 60))
     seat = next(i for i, m in enumerate(there.session.measured) if m.name == "seat")
     rows = there.session.measured[seat].sample_rows[:, -1] >= len(recording.samples)
     assert rows.sum() > 20

@@ -73,9 +73,9 @@ def test_the_published_names_are_there(tmp_path):
 def test_a_file_that_is_none_is_one_sentence(tmp_path, text, said):
     path = tmp_path / "d.json"
     path.write_text(text)
-    with pytest.raises(DataError, match=said) as told:
+    with pytest.raises(DataError, match=said) as lines:
         read_diagnosis(path)
-    assert str(path) in str(told.value)
+    assert str(path) in str(lines.value)
 
 
 def test_a_file_that_is_not_there_is_one_sentence(tmp_path):

@@ -40,7 +40,7 @@ def test_a_step_over_ten_shots_is_found_though_robust_weights_swallow_it(world):
     assert found == 3
 
 
-def test_trusted_again_wild_rows_propose_the_step(world):
+def test_trusted_again_outlying_rows_propose_the_step(world):
     rng = np.random.default_rng(3)
     session = slipped_for_ten_shots(world, rng)
     found = with_untrusted_step(Search(Bench(session), rng))
@@ -50,13 +50,13 @@ def test_trusted_again_wild_rows_propose_the_step(world):
     assert slipped.inner[0] == pytest.approx(session.drivers.t_s[-10], abs=np.diff(session.drivers.t_s)[-12:].max())
 
 
-def test_scattered_wild_rows_are_no_step(world):
+def test_scattered_outlying_rows_are_no_step(world):
     for seed in range(6):
         rng = np.random.default_rng(seed)
         session = world.session(rng)
-        wild = rng.choice(len(session.readings), 10, replace=False)
+        outlying = rng.choice(len(session.readings), 10, replace=False)
         readings = session.readings.copy()
-        readings[wild] += 25.0 * rng.choice([-1.0, 1.0], (10, readings.shape[1]))
+        readings[outlying] += 25.0 * rng.choice([-1.0, 1.0], (10, readings.shape[1]))
         assert with_untrusted_step(Search(Bench(world.with_readings(session, readings)), rng)) is None
 
 
@@ -70,7 +70,9 @@ def test_scattered_wild_rows_are_no_step(world):
         ("tracker", 1, "heated-link", "link-thermal-growth", ""),
     ],
 )
-def test_what_came_back_or_came_late_is_told_from_what_did_not(tmp_path, family, seed, hidden, physics, variant):
+def test_what_came_back_or_came_late_is_distinguished_from_what_did_not(
+    tmp_path, family, seed, hidden, physics, variant
+):
     recording = recording_of(tmp_path, family=family, seed=seed, samples=120, defects=(hidden,), enr=3.0)
     state = fit_geometry(session_of(recording.rig, recording.samples))
     [found] = search(state, np.random.default_rng(1)).state.accepted

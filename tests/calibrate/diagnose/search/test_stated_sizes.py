@@ -81,11 +81,11 @@ def test_a_value_that_the_data_do_not_tell_has_no_sigma_that_pretends_it(world):
     rng = np.random.default_rng(7)
     bench = Bench(world.session(rng))
     seen = rng.standard_normal(len(bench.state.rows.residual))
-    told, one, other = np.diag(sandwich(bench, np.stack([rng.permutation(seen), seen, 2.0 * seen], axis=1)))
-    assert np.isfinite(told)
-    assert told > 0.0
+    lines, one, other = np.diag(sandwich(bench, np.stack([rng.permutation(seen), seen, 2.0 * seen], axis=1)))
+    assert np.isfinite(lines)
+    assert lines > 0.0
     assert np.isinf([one, other]).all()
 
 
-def test_a_size_without_a_sigma_is_not_told_in_words_or_file():
+def test_a_size_without_a_sigma_is_not_reported_in_words_or_file():
     assert "not determined" in plain("shift_x_m", Size(1e-5, np.inf))

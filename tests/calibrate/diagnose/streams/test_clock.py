@@ -52,7 +52,7 @@ def test_clocks_without_an_offset_convert_nothing():
         ClockFit(ClockStatus.DOES_NOT_MOVE).to_reference(np.zeros(1))
 
 
-def test_one_wild_reading_moves_no_clock():
+def test_one_outlying_reading_moves_no_clock():
     scene = servo_scene(3)
     clock, own = drawn_clock(scene.rng, scene.encoders())
     own.values[len(own.values) // 2] += 0.5

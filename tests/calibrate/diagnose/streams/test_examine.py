@@ -40,7 +40,7 @@ def test_healthy_devices_with_clocks_of_their_own_have_no_fault(scene):
 
 
 @pytest.mark.parametrize(("device", "late_s"), [("encoders", 4e-3), ("spots", -3e-3)])
-def test_readings_stamped_late_are_told_by_how_much(scene, device, late_s):
+def test_readings_stamped_late_are_reported_by_how_much(scene, device, late_s):
     """The host's stamps are no later by it, since the line is what it was."""
     devices = devices_of_scene(scene, {})
     late = devices[device]
@@ -52,7 +52,7 @@ def test_readings_stamped_late_are_told_by_how_much(scene, device, late_s):
     assert 0.0 < found.p < 1e-3
 
 
-def test_a_clock_that_drifts_more_than_a_quartz_is_told(scene):
+def test_a_clock_that_drifts_more_than_a_quartz_is_reported(scene):
     devices = devices_of_scene(scene, {})
     own = devices["encoders"].track
     devices["encoders"] = delivered(scene.rng, replace(own, time_s=own.time_s + 12.0), -12.0, drift=4e-4)
@@ -60,7 +60,7 @@ def test_a_clock_that_drifts_more_than_a_quartz_is_told(scene):
     assert found.parameters["drift_s_per_s"].value == pytest.approx(-4e-4, abs=5e-6)
 
 
-def test_a_clock_that_was_set_is_told_and_does_not_hide_the_rest(scene):
+def test_a_clock_that_was_set_is_reported_and_does_not_hide_the_rest(scene):
     devices = devices_of_scene(scene, {})
     own = devices["encoders"]
     middle = len(own.track.time_s) // 2
@@ -81,8 +81,8 @@ def test_samples_that_a_reader_lost_are_missing_and_no_step_of_a_clock(scene):
     lost = replace(own, track=own.track.take(kept), host_s=own.host_s[kept], sequence=np.arange(len(kept)))
     report = examine({**devices, "encoders": lost}, predicted(scene))
     assert faults(report) == []
-    (told,) = [one for one in report.findings if one.name.physics == "missing-samples"]
-    assert told.parameters["samples_count"].value == 20
+    (lines,) = [one for one in report.findings if one.name.physics == "missing-samples"]
+    assert lines.parameters["samples_count"].value == 20
 
 
 def test_one_encoder_that_lags_is_that_joint_and_not_the_clock(scene):
@@ -119,7 +119,7 @@ def test_a_joint_that_rings_is_named_by_the_levers_of_the_model(scene):
     assert found.parameters["damping_share"].value == pytest.approx(0.03, rel=0.2)
 
 
-def test_samples_taken_too_early_are_told_by_their_rows():
+def test_samples_taken_too_early_are_reported_by_their_rows():
     scene = servo_scene(8, frequency_hz=4.0, moves=14, stand_s=1.0)
     devices = devices_of_scene(scene, {})
     stands = stands_of(devices["command"].track)[1:]

@@ -65,7 +65,7 @@ def test_few_stands_do_not_judge_slips():
 
 
 @pytest.mark.parametrize("seed", [1, 2])
-def test_missed_double_backward_and_frozen_samples_are_told_to_the_sample(seed):
+def test_missed_double_backward_and_frozen_samples_are_asked_to_the_sample(seed):
     assert streams.breaks_case(seed) == (True, 0)
 
 
@@ -85,13 +85,13 @@ def test_noise_that_stops_is_a_frozen_reading():
     assert [(b.fault, b.first, b.last) for b in found] == [(Fault.FROZEN, 300, 339)]
 
 
-def test_unsettled_samples_are_told_from_settled_ones():
+def test_unsettled_samples_are_distinguished_from_settled_ones():
     found, of, false, healthy = streams.settling_case(1)
     assert (found, false) == (of, 0)
     assert of > 0 < healthy
 
 
-def test_the_share_of_an_exponential_that_was_still_to_come_is_told():
+def test_the_share_of_an_exponential_that_was_still_to_come_is_reported():
     rng = np.random.default_rng(4)
     t = np.arange(0.0, 1.0, 1e-3)
     spots = Track("spots", "m", t, np.exp(-t / 0.08)[:, None] * 1e-4 + rng.normal(0.0, 1e-6, (1000, 1)))

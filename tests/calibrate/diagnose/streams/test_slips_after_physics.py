@@ -42,7 +42,7 @@ def test_a_soft_joint_is_no_slip(seed):
     assert found.found == ()
 
 
-def test_a_true_slip_is_found_beside_a_soft_joint():
+def test_a_true_slip_is_found_next_to_a_soft_joint():
     encoders, joints, stands = read(1, slip=True)
     (found,) = slips(encoders, joints, stands, causes).found
     assert found.joint == SLIPPED_JOINT + 1

@@ -13,7 +13,7 @@ from tests.support.pairs import Pair, device, laser, laser_line, link, place, se
 
 MOVED_M = np.array([80e-6, -60e-6, 50e-6])
 TURNED_RAD = np.array([1.5e-4, 1e-4, -2e-4])
-ELSEWHERE = device(np.array([1e-3, 2e-3, -1e-3]), np.array([1e-3, 0.0, 2e-3]))
+MOVED_DEVICE = device(np.array([1e-3, 2e-3, -1e-3]), np.array([1e-3, 0.0, 2e-3]))
 LENGTH, TWIST = (np.array([1.5e-4, 0, 0, 0, 0, 0]), np.array([0, 0, 0, 2e-4, 0, 0]))
 SEED = 5101
 
@@ -30,20 +30,20 @@ def stationed(k, shift_m, turn_rad):
 
 def station_turned(pair, k):
     """About its own origin, as the rig file has it."""
-    return place(k, np.zeros(3), TURNED_RAD, pair.case.drawn.believed.instrument.places[k - 1][:3, 3])
+    return place(k, np.zeros(3), TURNED_RAD, pair.case.drawn.nominal.instrument.places[k - 1][:3, 3])
 
 
 def laser_numbers(pair, change):
     """Of the laser's line, before and after."""
     drawn = pair.case.drawn
-    before, after = (laser_line(drawn.believed.instrument, r.instrument) for r in (drawn.true, change(drawn.true)))
+    before, after = (laser_line(drawn.nominal.instrument, r.instrument) for r in (drawn.true, change(drawn.true)))
     return shifts("laser", ("shift_u", "shift_v", "tilt_u", "tilt_v"), after - before)
 
 
 def changes(pair):
     """What is changed -> the change, the physics to name, and its numbers by parameter of model.json."""
     of_all = {"unchanged": (unchanged, "", {})}
-    whole = {**of_all, "the device set up elsewhere": (ELSEWHERE, "", {})}
+    whole = {**of_all, "the device set up elsewhere": (MOVED_DEVICE, "", {})}
     target = {"the target": (tool(MOVED_M), "tool-moved", shifts("tool"))}
     if pair.family == "wire":
         return whole | target

@@ -129,6 +129,6 @@ def test_a_model_that_predicts_its_session_worse_than_the_fit_is_refused():
     model = model_of_fit(fit, fit, Cleared(recording.samples, np.arange(SAMPLES), ()), recording, "geometry alone")
     ((name, rows, misfit),) = left_by(fit)
     assert as_fitted(model, recording.samples, [(name, rows, misfit)]) is model
-    beside = structs.replace(model, chain={**model.chain, "device.x": model.chain["device.x"] + 2e-5})
+    moved_model = structs.replace(model, chain={**model.chain, "device.x": model.chain["device.x"] + 2e-5})
     with pytest.raises(DataError, match="position in its own session"):
-        as_fitted(beside, recording.samples, [(name, rows, misfit)])
+        as_fitted(moved_model, recording.samples, [(name, rows, misfit)])

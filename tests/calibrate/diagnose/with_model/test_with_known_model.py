@@ -14,7 +14,7 @@ from acquisition.recording import read
 from calibeam.cli import run
 from calibrate.diagnose.assess.findings import named
 from calibrate.diagnose.new_poses.contests import duel, rival_named
-from calibrate.diagnose.new_poses.longer_session import elsewhere
+from calibrate.diagnose.new_poses.longer_session import at_new_poses
 from calibrate.diagnose.new_poses.next_poses import next_poses, reach_of
 from calibrate.diagnose.new_poses.reachable import reachable
 from calibrate.diagnose.search.bench import Bench
@@ -138,7 +138,7 @@ def test_a_joint_that_has_become_softer_is_named_with_its_size(soft, tmp_path):
 
 # Daily: beside a later recording.
 @pytest.mark.parametrize("moved_rad", [pytest.param(None, marks=pytest.mark.endure), MOVED_RAD])
-def test_poses_that_tell_rivals_apart_are_chosen_beside_a_model(soft, moved_rad):
+def test_poses_that_tell_rivals_apart_are_chosen_with_a_model(soft, moved_rad):
     """On its own recording, and on a later one: what the model holds is there at new poses, too."""
     folder, _, _ = soft
     name = "recording" if moved_rad is None else "moved-for-poses"
@@ -148,7 +148,7 @@ def test_poses_that_tell_rivals_apart_are_chosen_beside_a_model(soft, moved_rad)
     physics = "joint-zero-moved" if moved_rad else "backlash"
     state = best_of(state, physics, f"joint{JOINT}.angle")
     offered = reachable(state, np.random.default_rng(1), 60)
-    there = elsewhere(state, offered)
+    there = at_new_poses(state, offered)
     assert len(there.brought) == len(state.brought) == 1
     carried, _ = there.added(there.brought[0])
     assert np.max(np.abs(carried)) > 0.0
@@ -196,7 +196,7 @@ def test_a_known_structure_is_refitted_to_another_recording(soft, capsys):
     assert run(["predict", str(out), str(recording / "samples.csv"), "--out", str(predicted)]) == 0
 
 
-def test_a_plan_beside_a_known_structure_is_refused(soft, tmp_path, capsys):
+def test_a_plan_next_to_a_known_structure_is_refused(soft, tmp_path, capsys):
     folder, _, _ = soft
     (tmp_path / "fit.toml").write_text("schema = 1\n")
     arguments = ["identify", str(folder / "recording"), "--model", str(folder / "model.json")]

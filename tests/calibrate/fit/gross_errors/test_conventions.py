@@ -31,7 +31,7 @@ def coupled(q, joint, sign):
     return turned(q, joint, sign * q[:, joint - 2])
 
 
-def test_an_arm_a_few_millimetres_beside_its_drawing_is_no_blunder(scene):
+def test_an_arm_a_few_millimetres_off_its_drawing_is_no_gross_error(scene):
     assert judged(scene.q_rad, scene.position_m) is None
     assert judged(scene.q_rad, scene.position_m, None) is None
 
@@ -52,7 +52,7 @@ MORE = [(5, 1), (6, 2), (2, -1)]  # daily: quarters of either sign and a half, a
 @pytest.mark.parametrize(
     ("joint", "quarters"), [*QUARTERS, *(pytest.param(*one, marks=pytest.mark.endure) for one in MORE)]
 )
-def test_a_zero_beside_by_quarters_of_a_turn_is_named_with_what_to_add(scene, joint, quarters):
+def test_a_zero_off_by_quarters_of_a_turn_is_named_with_what_to_add(scene, joint, quarters):
     found = judged(turned(scene.q_rad, joint, quarters * np.pi / 2), scene.position_m)
     assert f"q{joint}_rad" in found.says
     assert f"zero of joint {joint} is" in found.says
@@ -74,7 +74,7 @@ def test_an_angle_counted_from_another_link_is_named(scene, joint, sign, remedy)
 
 
 @pytest.mark.parametrize("mirror", [[-1, 1, 1], [1, -1, 1], [1, 1, -1]])
-def test_a_mirrored_axis_of_the_device_is_told_by_the_determinant(scene, mirror):
+def test_a_mirrored_axis_of_the_device_is_reported_by_the_determinant(scene, mirror):
     found = judged(scene.q_rad, scene.position_m * mirror)
     assert found.kind is GrossErrorKind.MIRRORED_AXIS
     assert "determinant -1" in found.says
@@ -111,7 +111,7 @@ def test_one_column_in_degrees_is_named_alone(scene):
     assert (found.kind, found.column) == (GrossErrorKind.DEGREES, "column q4_rad")
 
 
-def test_wild_rows_do_not_hide_the_convention(scene):
+def test_outlying_rows_do_not_hide_the_convention(scene):
     scene.position_m[::7] += 3.0
     found = judged(reversed_joint(scene.q_rad, 3), scene.position_m)
     assert found.kind is GrossErrorKind.JOINT_SIGN

@@ -51,5 +51,5 @@ def test_an_end_that_was_in_a_cone_takes_the_other_row_of_the_cone_with_it():
     assert [b.rows for b in found] == [(1,), (2,)]
 
 
-def test_a_cone_that_had_one_row_from_the_start_is_not_a_matter_of_blunders():
+def test_a_cone_that_had_one_row_from_the_start_is_not_a_matter_of_gross_errors():
     assert left_alone(samples(3, seat=np.array([1.0, np.nan, np.nan])), [bad(2)]) == ()

@@ -17,7 +17,7 @@ def test_honest_rows_are_left_alone(scene):
     assert rows_of_another_session(scene.shots()) == ()
 
 
-def test_heavy_tails_are_not_blunders(scene):
+def test_heavy_tails_are_not_gross_errors(scene):
     rng = np.random.default_rng(2)
     scene.position_m += NOISE * rng.standard_t(4, scene.position_m.shape)
     assert bad_rows(scene.shots()) == ()
@@ -84,8 +84,8 @@ def test_a_block_of_another_session_is_named_by_its_frame(scene, turn, shift):
 
 @pytest.mark.parametrize("rows", [slice(0, 45), slice(60, 100)])
 def test_another_session_is_seen_before_any_fit_by_the_arm_as_drawn(scene, rows):
-    elsewhere = Rotation.from_rotvec([0.4, 0.1, -1.0]).apply(scene.position_m[rows])
-    scene.position_m[rows] = elsewhere + np.array([0.5, 0.0, 0.1])
+    turned_m = Rotation.from_rotvec([0.4, 0.1, -1.0]).apply(scene.position_m[rows])
+    scene.position_m[rows] = turned_m + np.array([0.5, 0.0, 0.1])
     every = np.arange(10, 130)
     (found,) = sessions_apart(flange(scene.q_rad), scene.position_m, POINT, every)
     assert found.kind is GrossErrorKind.OTHER_SESSION
@@ -119,7 +119,7 @@ def test_rows_whose_neighbours_in_posture_err_alike_at_other_times_are_no_fault(
     assert [b.rows for b in bad_rows(scene.shots())] == [(90,)]
 
 
-def test_one_bad_row_beside_good_ones_in_its_posture_is_a_fault(scene):
+def test_one_bad_row_next_to_good_ones_in_its_posture_is_a_fault(scene):
     rows = of_the_arm(scene, 17, (5, 30, 52, 77, 101))
     scene.position_m[rows[1:]] = scene.expect(scene.q_rad[rows[1:]])
     assert [b.rows for b in bad_rows(scene.shots())] == [(5,)]

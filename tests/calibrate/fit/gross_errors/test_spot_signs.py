@@ -54,7 +54,7 @@ def test_a_healthy_session_and_one_of_missing_physics_are_left_alone(rig, lit):
     assert mirrored_axes(rig, samples(lit, sagging)) is None
 
 
-def test_wild_rows_do_not_hide_it(rig, lit):
+def test_outlying_rows_do_not_hide_it(rig, lit):
     spots = lit.spots_m * np.array([-1.0, 1.0, 1.0, 1.0])
     spots[[4, 40]] += 3e-3
     assert mirrored_axes(rig, samples(lit, spots)).column == "column psd1_x_m"

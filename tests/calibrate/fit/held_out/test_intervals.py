@@ -36,8 +36,8 @@ def test_a_wider_level_is_a_wider_interval(fitted):
 
 def test_what_only_counts_together_has_no_number_whatever_holds_it(fitted):
     one = fitted(80)
-    believed = reduced(one.problem.chain.parameters, one.seen, Redundant.HELD_BY_PRIORS)
-    for fit in (one.fit, solve(one.problem.with_parameters(believed), start=one.fit.theta)):
+    held_by_priors = reduced(one.problem.chain.parameters, one.seen, Redundant.HELD_BY_PRIORS)
+    for fit in (one.fit, solve(one.problem.with_parameters(held_by_priors), start=one.fit.theta)):
         assert fit.status is Status.CONVERGED
         found = by_name(fit, one.seen)
         for name in ("joint1.zero", "device.yaw", "joint6.zero", "tool.x"):

@@ -55,7 +55,7 @@ MORE = [pytest.param(samples, marks=pytest.mark.endure) for samples in (wire, ba
 
 @pytest.mark.parametrize("samples", [positions, cones, *MORE])
 def test_identified_predicted_and_exported_alike(rig, session, samples):
-    seen, left, told = samples(session), {}, {}
+    seen, left, lines = samples(session), {}, {}
     for model in ArmModel:
         own = written_as(rig, model)
         result = identify(own, seen, rng=np.random.default_rng(1), held_out_share=0.0)
@@ -64,7 +64,7 @@ def test_identified_predicted_and_exported_alike(rig, session, samples):
         (instrument,) = result.instruments
         left[model] = instrument.rms_distance_after_m
         predicted = predict(Predictor(own, values, result.about, (instrument.name,)), seen)
-        told[model] = np.stack([predicted[c] for c in sorted(set(predicted) - {"t_s"})])
+        lines[model] = np.stack([predicted[c] for c in sorted(set(predicted) - {"t_s"})])
         for form in FORMS:
             assert export_text(own, values, form)
     np.testing.assert_allclose(list(left.values()), left[ArmModel.DH], rtol=1e-3)
@@ -73,7 +73,7 @@ def test_identified_predicted_and_exported_alike(rig, session, samples):
         "wire",
     ):  # a tip in the base turns with the base, which cones and bars leave open
         for model in ArmModel:
-            np.testing.assert_allclose(told[model], told[ArmModel.DH], atol=2e-6, equal_nan=True)
+            np.testing.assert_allclose(lines[model], lines[ArmModel.DH], atol=2e-6, equal_nan=True)
 
 
 def test_zeros_by_the_dual_psd_do_not_depend_on_the_writing_but_what_they_are_measured_from_does(rig, sessions):

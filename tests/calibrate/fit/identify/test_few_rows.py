@@ -22,7 +22,7 @@ def recorded(folder, seed, rows):
 
 def left_out(rig, samples):
     found = identify(rig, samples, held_out_share=0.0, rng=np.random.default_rng(1))
-    return [blunder.rows for blunder in found.blunders]
+    return [gross_error.rows for gross_error in found.blunders]
 
 
 @pytest.mark.parametrize("seed", [1, 2, pytest.param(3, marks=pytest.mark.endure)])

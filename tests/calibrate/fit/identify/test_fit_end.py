@@ -9,7 +9,7 @@ from scipy.stats import multivariate_normal
 
 from calibrate.fit.accuracy import minus_2_log_likelihood
 from calibrate.fit.fit_plan import parse_plan
-from calibrate.fit.identify.identify import identify, without_blunders
+from calibrate.fit.identify.identify import identify, without_gross_errors
 from calibrate.fit.identify.record import record_of
 from calibrate.fit.identify.rounds import settled_fit
 from calibrate.fit.solvers import Status, Stop
@@ -85,7 +85,7 @@ def test_the_model_file_holds_the_end_of_the_fit_and_older_ones_are_read(tracked
 def test_the_likelihood_is_that_of_the_normal_law(tracked, instrument):
     """By the covariance of all rows at once, neighbouring distances correlated."""
     plan = parse_plan(f'schema = 1\ninstruments = ["{instrument}"]\n', "fit.toml")
-    weighting, start, _ = without_blunders(*tracked, plan)
+    weighting, start, _ = without_gross_errors(*tracked, plan)
     fitted = settled_fit(weighting, start)
     (block,) = fitted.problem.blocks
     misfit = block.misfit(fitted.fit.theta).ravel()

@@ -35,7 +35,7 @@ def moved(samples, rows, turn, shift):
     return changed(samples, **dict(zip(POSITION, xyz.T, strict=True)))
 
 
-def test_a_clean_session_has_no_blunders(clean):
+def test_a_clean_session_has_no_gross_errors(clean):
     assert clean.blunders == ()
 
 
@@ -67,7 +67,7 @@ def test_several_kinds_at_once_are_each_named(rig, samples):
 
 
 @pytest.mark.parametrize(("turn", "shift"), [([0.0, 0.0, 1.0], [0.5, 0.0, 0.0]), ([0.0, 0.0, 1e-3], [5e-4, 0.0, 1e-3])])
-def test_rows_of_another_session_are_one_blunder(rig, samples, turn, shift):
+def test_rows_of_another_session_are_one_gross_error(rig, samples, turn, shift):
     result = run(rig, moved(samples, slice(40, 80), turn, shift))
     rows = {row for b in result.blunders for row in b.rows}
     assert {b.kind for b in result.blunders} == {GrossErrorKind.OTHER_SESSION}

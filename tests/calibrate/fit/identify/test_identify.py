@@ -65,13 +65,13 @@ def test_links_without_tolerance_are_free_and_the_noise_is_found(without_toleran
 
 def test_what_is_said_with_a_sigma_is_true(rig, without_tolerance):
     session, result = without_tolerance
-    told = {e.name: e for e in result.estimates if e.value is not None}
+    lines = {e.name: e for e in result.estimates if e.value is not None}
     truth = {f"link{i + 1}.length": row[1] - rig.arm.joints[i].a_m for i, row in enumerate(session.truth.links)}
     for name in ("link2.length", "link3.length"):
-        assert abs(told[name].value - truth[name]) < 4.0 * told[name].sigma
-        assert told[name].sigma < 3e-5
+        assert abs(lines[name].value - truth[name]) < 4.0 * lines[name].sigma
+        assert lines[name].sigma < 3e-5
     for name in ("joint1.zero", "device.yaw", "link1.offset", "device.z", "link2.offset"):
-        assert name not in told
+        assert name not in lines
     assert result.status is Status.RANK_DEFICIENT
 
 

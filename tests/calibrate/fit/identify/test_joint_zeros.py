@@ -99,7 +99,7 @@ def test_noise_of_joints_and_detectors_is_found_and_chi_square_agrees(results):
             assert abs(found.found - true) < 4.0 * found.sigma
 
 
-def test_joints_without_noise_are_reported_as_not_to_be_told_from_none(rig, sessions):
+def test_joints_without_noise_are_reported_as_not_to_be_distinguished_from_none(rig, sessions):
     session = sessions(8, n=45, joint_noise=0.0)
     result = run(rig, session)
     assert result.noise_settled
@@ -160,7 +160,7 @@ def test_physics_that_the_model_lacks_is_seen_as_lack_of_fit(rig, sessions):
 def test_stated_sigmas_of_the_spots_are_used(rig, sessions):
     session = sessions(4, n=45, psd_noise=3e-7)
     result = run(rig, session, sigma_m=3e-7)
-    assert noise(result, "psd").believed == pytest.approx(3e-7)
+    assert noise(result, "psd").assumed == pytest.approx(3e-7)
     assert all(abs(z) < 4.5 for z in deviations(result, session.truth))
     assert 0.7 < result.stated_noise.chi2 / result.stated_noise.dof < 1.4
 

@@ -88,12 +88,12 @@ def test_what_is_said_of_the_arm_is_true(mixed, identified, session):
     assert (result.status, result.blunders) == (Status.RANK_DEFICIENT, ())
     assert result.stated_noise.alarm is Alarm.NONE
     truth = true_corrections(rig, session.truth)
-    told = {e.name: e for e in result.estimates if e.value is not None and e.name in truth}
-    off = {name: (e.value - truth[name]) / e.sigma for name, e in told.items()}
-    assert len(told) > 18
+    lines = {e.name: e for e in result.estimates if e.value is not None and e.name in truth}
+    off = {name: (e.value - truth[name]) / e.sigma for name, e in lines.items()}
+    assert len(lines) > 18
     assert max(abs(v) for v in off.values()) < 4.0
     assert np.sqrt(np.mean(np.square(list(off.values())))) < 1.4
-    assert not {"joint1.zero", "joint6.zero", "tool.x"} & set(told)  # all that is at the flange turns with joint 6
+    assert not {"joint1.zero", "joint6.zero", "tool.x"} & set(lines)  # all that is at the flange turns with joint 6
 
 
 def test_all_instruments_together_know_a_link_better_than_each_alone(identified):
@@ -139,7 +139,7 @@ def test_a_known_distance_goes_with_the_place_that_is_left_out(mixed, session):
     assert by_place.rms_distance_after_m < 2e-5  # a place that stood where the drawing says would be off by millimetres
 
 
-def test_tolerances_of_gains_second_face_and_device_reach_the_fit_as_beliefs(mixed):
+def test_tolerances_of_gains_second_face_and_device_reach_the_fit_as_priors(mixed):
     rig, samples = mixed
     stated = msgspec.structs.replace(
         rig.tolerance, gain=2e-3, psd2_m=5e-5, psd2_rad=1e-3, device_m=2e-3, device_rad=3e-3
@@ -149,11 +149,11 @@ def test_tolerances_of_gains_second_face_and_device_reach_the_fit_as_beliefs(mix
     prior = {p.name: p.prior for p in result.parameters if p.free}
     assert {prior[f"psd{k}.gain_{a}"] for k in (1, 2) for a in "xy"} == {2e-3}
     assert [prior["psd2.x"], prior["psd2.yaw"], prior["device.x"], prior["device.yaw"]] == [5e-5, 1e-3, 2e-3, 3e-3]
-    told = {e.name: e for e in result.estimates if e.value is not None}
+    lines = {e.name: e for e in result.estimates if e.value is not None}
     for name in ("psd1.gain_x", "psd2.gain_y"):
-        assert abs(told[name].value - 1.0) < 4.0 * told[name].sigma
-        assert told[name].sigma < 1e-3
-    assert "joint1.zero" in told  # a device that is believed has a yaw to refer it to
+        assert abs(lines[name].value - 1.0) < 4.0 * lines[name].sigma
+        assert lines[name].sigma < 1e-3
+    assert "joint1.zero" in lines  # a device that is believed has a yaw to refer it to
 
 
 def test_refits_to_drawn_rows_of_all_instruments_agree_with_the_covariance(mixed):

@@ -62,11 +62,11 @@ def error_m(tracked, result, fresh, **keys):
     return np.sqrt(np.mean([predicted[f"r_{c}"] ** 2 for c in AXES]))
 
 
-def told(result):
+def lines(result):
     return {e.name: e for e in result.estimates if e.value is not None}
 
 
-def test_what_is_held_freed_and_believed_is_so_in_the_fit(tracked):
+def test_what_is_held_freed_and_assumed_is_so_in_the_fit(tracked):
     priors = {"link*.length": 5e-4, "link2.length": 1e-4}
     result = run(tracked, hold=("link6.*", "link2.offset"), free=("link3.*",), priors=priors)
     now = {p.name: p for p in result.parameters}
@@ -85,10 +85,10 @@ def test_the_arm_may_be_fitted_in_another_model(tracked, fresh, plain):
         assert error_m(tracked, other, fresh, model=model) < 0.6 * NOISE_M
 
 
-def test_dog_leg_gives_the_same_answer_and_a_loss_one_within_the_doubt(tracked, plain):
-    own = told(plain)
-    dogleg = told(run(tracked, solver=SolverName.DOGLEG))
-    huber = told(run(tracked, loss=LossName.HUBER))
+def test_dog_leg_gives_the_same_answer_and_a_loss_one_within_the_uncertainty(tracked, plain):
+    own = lines(plain)
+    dogleg = lines(run(tracked, solver=SolverName.DOGLEG))
+    huber = lines(run(tracked, loss=LossName.HUBER))
     for name, e in own.items():
         assert abs(dogleg[name].value - e.value) < 1e-3 * e.sigma
         assert abs(huber[name].value - e.value) < 1.5 * e.sigma
@@ -104,11 +104,11 @@ def test_redundant_parameters_held_by_priors_have_no_number_either(tracked, fres
     removed, pulled = plain, run(tracked, redundant=RedundantName.PRIORS)
     assert error_m(tracked, pulled, fresh) < 0.6 * NOISE_M
     for result in (removed, pulled):
-        assert not {"joint1.zero", "device.yaw", "joint6.zero"} & set(told(result))
-    shared = set(told(removed)) & set(told(pulled))
+        assert not {"joint1.zero", "device.yaw", "joint6.zero"} & set(lines(result))
+    shared = set(lines(removed)) & set(lines(pulled))
     assert len(shared) > 8
     for name in shared:
-        assert abs(told(removed)[name].value - told(pulled)[name].value) < told(removed)[name].sigma
+        assert abs(lines(removed)[name].value - lines(pulled)[name].value) < lines(removed)[name].sigma
 
 
 def test_share_and_splits_are_those_of_the_plan(tracked):
@@ -155,8 +155,8 @@ def with_encoders(rig, session):
 
 
 def test_second_encoders_may_drive_the_arm_whatever_their_zeros_and_senses(with_encoders):
-    by_controller = told(run(with_encoders))
-    by_encoders = told(run(with_encoders, angles=AnglesName.ENCODERS))
+    by_controller = lines(run(with_encoders))
+    by_encoders = lines(run(with_encoders, angles=AnglesName.ENCODERS))
     zeros = [name for name in by_encoders if name.startswith("joint") and name.endswith(".zero")]
     assert zeros
     for name in zeros:  # about the controller's zeros, not about those of the encoders
@@ -166,7 +166,7 @@ def test_second_encoders_may_drive_the_arm_whatever_their_zeros_and_senses(with_
 
 def test_second_encoders_are_an_instrument_where_the_plan_lists_them(with_encoders):
     listed = ("position", "encoder-difference")
-    found = told(run(with_encoders, instruments=listed))
+    found = lines(run(with_encoders, instruments=listed))
     for i in range(6):  # zeros are those of the encoder turned to the joint's sense
         away = found[f"encoder{i + 1}.zero"].value - SENSES[i] * ENCODER_ZEROS[i]
         assert abs((away + np.pi) % (2.0 * np.pi) - np.pi) < 5.0 * SEATING_RAD

@@ -8,9 +8,9 @@ from calibrate.errors import DataError
 from calibrate.fit.identify.point_constraint import (
     BOUND_RAD,
     Constraint,
-    DrawingDoubt,
+    DrawingTolerance,
     PointConstraint,
-    drawing_doubt,
+    drawing_tolerance,
     identify_by_four_poses,
     identify_by_point,
 )
@@ -20,7 +20,7 @@ from calibrate.model.dual_psd_rig import laser_of
 from calibrate.model.observations import Observations
 from calibrate.model.parameters import Parameter, start_values
 
-DOUBT = DrawingDoubt(line_m=5e-6, length_m=3e-4, angle_rad=5e-4)
+TOLERANCES = DrawingTolerance(line_m=5e-6, length_m=3e-4, angle_rad=5e-4)
 
 
 @pytest.fixture(scope="module")
@@ -44,7 +44,7 @@ def exact(sessions, ur5e_exact):
 
 
 def test_enough_poses_of_an_exact_rig_give_every_zero_but_the_first(rig, exact):
-    result = identify_by_point(arm_of(rig), laser_of(rig), centred(exact, 5), DOUBT)
+    result = identify_by_point(arm_of(rig), laser_of(rig), centred(exact, 5), TOLERANCES)
     assert result.status is Status.RANK_DEFICIENT
     assert result.identifiability.rank == 5
     assert (result.zeros[0].value_rad, result.zeros[0].why) == (None, "the measurement does not depend on it")
@@ -55,7 +55,7 @@ def test_enough_poses_of_an_exact_rig_give_every_zero_but_the_first(rig, exact):
 
 def test_middles_of_the_pairs_lose_an_equation_and_report_no_number(rig, exact):
     """What the paper met: four poses, six offsets, J2 and J3 at their bound."""
-    result = identify_by_four_poses(arm_of(rig), laser_of(rig), centred(exact, 2), DOUBT)
+    result = identify_by_four_poses(arm_of(rig), laser_of(rig), centred(exact, 2), TOLERANCES)
     assert result.status is Status.RANK_DEFICIENT
     assert result.identifiability.rank == 4
     lost = {name for c in result.identifiability.combinations for name in c.members}
@@ -71,7 +71,7 @@ def test_drawing_errors_are_in_the_sigma(rig, sessions, seeds):
     for seed in range(seeds):
         session = sessions(seed, n=40, spread=0.0, places=(1,))
         for each, identify in ((2, identify_by_four_poses), (6, identify_by_point)):
-            result = identify(arm_of(rig), laser_of(rig), centred(session, each), drawing_doubt(rig))
+            result = identify(arm_of(rig), laser_of(rig), centred(session, each), drawing_tolerance(rig))
             found = [zero for zero in result.zeros if zero.value_rad is not None]
             assert all(abs(zero.value_rad) < BOUND_RAD for zero in found)
             z += [(zero.value_rad - session.truth.zeros[zero.joint - 1]) / zero.sigma_rad for zero in found]
@@ -84,7 +84,7 @@ def test_a_zero_at_its_bound_silences_the_whole_answer(rig, sessions, ur5e_exact
     truth = ur5e_exact()
     truth.zeros = np.array([0.0, 0.1, 0.0, 0.0, 0.0, 0.0])  # beyond the bound of 0.0785
     session = sessions(22, n=40, truth=truth, spread=0.0, places=(1,), joint_noise=0.0, psd_noise=0.0)
-    result = identify_by_point(arm_of(rig), laser_of(rig), centred(session, 5), DOUBT)
+    result = identify_by_point(arm_of(rig), laser_of(rig), centred(session, 5), TOLERANCES)
     assert result.status is Status.AT_BOUND
     assert all(zero.value_rad is None for zero in result.zeros)
     assert any("bound" in str(zero.why) for zero in result.zeros)
@@ -105,13 +105,13 @@ def test_derivatives_are_differences(rig, exact, form):
 def test_poses_of_two_placements_do_not_meet_in_a_point(rig, sessions):
     session = sessions(23, n=20, spread=0.0, places=(1, 2))
     with pytest.raises(DataError, match="poses at placements 1, 2"):
-        identify_by_point(arm_of(rig), laser_of(rig), centred(session, 8), DOUBT)
+        identify_by_point(arm_of(rig), laser_of(rig), centred(session, 8), TOLERANCES)
 
 
 def test_both_orders_are_needed(rig, exact):
     data = centred(exact, 4)
     with pytest.raises(DataError, match="4 poses strike PSD 1 first and 0 PSD 2"):
-        identify_by_point(arm_of(rig), laser_of(rig), data.select(np.flatnonzero(data.first_psd == 1)), DOUBT)
+        identify_by_point(arm_of(rig), laser_of(rig), data.select(np.flatnonzero(data.first_psd == 1)), TOLERANCES)
 
 
 def test_spots_off_centre_are_refused_with_their_pose(rig, exact):
@@ -120,4 +120,4 @@ def test_spots_off_centre_are_refused_with_their_pose(rig, exact):
     spots[4, 2] = 2e-3
     off = Observations(data.q_rad, data.first_psd, data.placement, spots)
     with pytest.raises(DataError, match=r"spots of pose 4 are 0\.002 m off centre"):
-        identify_by_point(arm_of(rig), laser_of(rig), off, DOUBT)
+        identify_by_point(arm_of(rig), laser_of(rig), off, TOLERANCES)

@@ -23,7 +23,7 @@ def rig(request):
 
 
 @pytest.fixture(scope="module")
-def doubted(rig):
+def open_rig(rig):
     return msgspec.structs.replace(rig, tolerance=msgspec.structs.replace(rig.tolerance, psd2_m=1e-4, psd2_rad=1e-3))
 
 
@@ -65,7 +65,7 @@ def of_zeros(estimates, session):
 
 
 @pytest.mark.parametrize("seed", SEEDS)
-@pytest.mark.parametrize("which", ["doubted", "silent"])
+@pytest.mark.parametrize("which", ["open_rig", "silent"])
 def test_a_bent_bracket_and_the_zeros_are_found_within_sigma(request, which, bent, seed):
     session = bent(seed)
     found = found_in(request.getfixturevalue(which), session)
@@ -82,7 +82,7 @@ def test_a_bracket_that_is_stated_exact_is_held_and_leaves_what_it_is_off(rig, b
     assert not any(p.free for p in found.parameters if p.name in BRACKET)
 
 
-def test_what_only_an_unstated_belief_determines_has_no_number(silent, bent):
+def test_what_only_an_unstated_prior_determines_has_no_number(silent, bent):
     found = found_in(silent, bent(53))
     why = {e.name: e.why for e in found.estimates}
     assert {"link1.offset", "link6.offset", "link6.length", "link6.twist"} <= {n for n, w in why.items() if w}
@@ -103,7 +103,7 @@ def test_where_a_zero_has_a_links_turn_as_its_other_name_it_has_none(silent, ben
     assert found.instruments[0].rms_distance_after_m < 1e-5
 
 
-def test_a_plan_that_states_a_belief_makes_it_one(silent, bent):
+def test_a_plan_that_states_a_prior_makes_it_one(silent, bent):
     plan = FitPlan(schema=1, priors={"psd2*": 2e-3})
     by = {p.name: p for p in instruments_for_fit(silent, spot_samples(bent(51)), plan).weighting.parameters}
     assert all(by[name].prior == 2e-3 and not by[name].assumed for name in BRACKET)
@@ -111,7 +111,7 @@ def test_a_plan_that_states_a_belief_makes_it_one(silent, bent):
     assert by["link2.length"].assumed
 
 
-def test_a_person_is_told_what_is_believed_unasked(rig, silent):
+def test_a_person_is_shown_what_is_assumed_unasked(rig, silent):
     assert said_of(rig) is None
     assert "no [tolerance]: links assumed to ± 5 mm, 10 mrad, PSD 2 in PSD 1 to ± 1 mm, 5 mrad" in said_of(silent)
     assert (PAIR.length_sigma_m, PAIR.angle_sigma_rad) == (1e-3, 5e-3)

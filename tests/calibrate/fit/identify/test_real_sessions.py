@@ -79,7 +79,7 @@ def test_the_published_error_of_b_is_of_a_lucky_split_which_no_arm_reaches_on_al
 
 @pytest.mark.endure  # daily: tests/golden/test_real_robots.py
 @pytest.mark.parametrize("name", FIGURES_M)
-def test_the_identification_tells_the_unseen_error_and_finds_no_blunder_in_a_good_session(real, name):
+def test_the_identification_tells_the_unseen_error_and_finds_no_gross_error_in_a_good_session(real, name):
     result = run(real(name), share=0.2)
     unseen = result.held_out[0]
     assert "random" in unseen.split
@@ -106,7 +106,7 @@ def test_axis_4_of_the_ur5_is_11_6_mrad_out_of_parallel_to_axis_3_in_every_part_
 
 
 @pytest.mark.endure  # daily: several kinds at once, in test_blunders_in_sessions.py
-def test_blunders_made_in_the_ur5_session_are_found_and_no_others(real):
+def test_gross_errors_made_in_the_ur5_session_are_found_and_no_others(real):
     recording = real("ur5-tracker")
     samples = recording.samples
     x, q3 = samples.column("x_m").copy(), samples.column("q3_rad").copy()

@@ -5,7 +5,7 @@ import pytest
 from calibrate.fit.identify.result import scale_alarms
 
 
-def test_cones_alone_are_told_to_show_no_length() -> None:
+def test_cones_alone_are_asked_to_show_no_length() -> None:
     (alarm,) = scale_alarms(["seat"])
     assert "no length" in alarm
     assert "[[bar]]" in alarm

@@ -47,7 +47,7 @@ def drawn(session):
     return table(q, **read_at(session, q, points, np.random.default_rng(12)), target=named.astype(float))
 
 
-def test_each_target_is_a_point_of_its_own_and_fresh_rows_are_told_of_theirs(several, drawn, session):
+def test_each_target_is_a_point_of_its_own_and_fresh_rows_are_given_theirs(several, drawn, session):
     result = identify(several, drawn, rng=np.random.default_rng(0), held_out_share=0.0)
     values = {p.name: float(v) for p, v in zip(result.parameters, result.theta, strict=True)}
     at = {k: result.about[f"target{k}"] + np.array([values[f"target{k}.{a}"] for a in "xyz"]) for k in TRUE_M}
@@ -57,8 +57,8 @@ def test_each_target_is_a_point_of_its_own_and_fresh_rows_are_told_of_theirs(sev
     q, named = session.readings(30), np.resize([7.0, 1.0, 2.0], 30)
     points = np.array([TRUE_M[int(k)] for k in named])
     fresh = table(q, **read_at(session, q, points, np.random.default_rng(2)), target=named)
-    told = predict(Predictor(several, values, result.about, ("position",)), fresh)
-    left = np.stack([told[f"r_{a}_m"] for a in "xyz"])
+    lines = predict(Predictor(several, values, result.about, ("position",)), fresh)
+    left = np.stack([lines[f"r_{a}_m"] for a in "xyz"])
     assert np.sqrt(np.mean(left**2)) < 3.0 * NOISE_M
 
 
@@ -118,7 +118,7 @@ def test_a_wrong_sign_shows_in_targets_that_were_read_less(several, session):
     assert found.column == "column q6_rad"
 
 
-def test_targets_that_sit_elsewhere_than_drawn_are_no_wrong_sign_where_the_readings_fit(several, session):
+def test_targets_that_sit_not_where_drawn_are_no_wrong_sign_where_the_readings_fit(several, session):
     q, named = with_a_still_wrist(session)
     q[:, -1] = 0.4
     turned = {k: TURNED @ DRAWN[i].point_m for i, k in enumerate(TRUE_M)}

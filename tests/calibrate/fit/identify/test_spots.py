@@ -7,7 +7,7 @@ from acquisition.recording import Samples
 from acquisition.recording.rig import load_rig
 from calibrate.errors import DataError
 from calibrate.fit.fit_plan import FitPlan
-from calibrate.fit.identify.identify import identify, without_blunders
+from calibrate.fit.identify.identify import identify, without_gross_errors
 from calibrate.model.checks.gross_error import GrossErrorKind
 from tests.calibrate.conftest import spot_samples
 from tests.calibrate.fit.identify.conftest import changed
@@ -24,8 +24,8 @@ def samples(sessions):
 
 
 def test_honest_spots_are_all_kept(rig, samples):
-    weighting, _, blunders = without_blunders(rig, samples)
-    assert blunders == ()
+    weighting, _, gross_errors = without_gross_errors(rig, samples)
+    assert gross_errors == ()
     assert weighting.measured[0].problem.rows == len(samples)
 
 
@@ -35,7 +35,7 @@ def test_honest_spots_are_all_kept(rig, samples):
 def test_a_typed_digit_is_named_by_row_and_column(rig, samples, column, off):
     values = samples.column(column).copy()
     values[17] += off
-    weighting, _, (found,) = without_blunders(rig, changed(samples, **{column: values}))
+    weighting, _, (found,) = without_gross_errors(rig, changed(samples, **{column: values}))
     assert (found.kind, found.rows) == (GrossErrorKind.WRONG_VALUE, (17,))
     assert found.column == column
     assert weighting.measured[0].problem.rows == len(samples) - 1
@@ -45,8 +45,8 @@ def test_a_copied_row_is_left_out_and_later_rows_keep_their_numbers(rig, samples
     doubled = Samples({k: np.insert(v, 5, v[2]) for k, v in samples.columns.items()}, 6)
     x = doubled.column("psd1_x_m").copy()
     x[40] += 2e-3
-    _, _, blunders = without_blunders(rig, changed(doubled, psd1_x_m=x))
-    assert {(b.kind, b.rows) for b in blunders} == {
+    _, _, gross_errors = without_gross_errors(rig, changed(doubled, psd1_x_m=x))
+    assert {(b.kind, b.rows) for b in gross_errors} == {
         (GrossErrorKind.DUPLICATED_ROWS, (5,)),
         (GrossErrorKind.WRONG_VALUE, (40,)),
     }
@@ -55,7 +55,7 @@ def test_a_copied_row_is_left_out_and_later_rows_keep_their_numbers(rig, samples
 def test_degrees_are_refused_by_name(rig, samples):
     degrees = {f"q{i}_rad": np.degrees(samples.column(f"q{i}_rad")) for i in range(1, 7)}
     with pytest.raises(DataError, match="these are degrees"):
-        without_blunders(rig, changed(samples, **degrees))
+        without_gross_errors(rig, changed(samples, **degrees))
 
 
 def test_spots_are_proved_by_every_split_and_raise_no_alarm(rig, samples):

@@ -18,7 +18,7 @@ def draw(rng, n, joint_rad, psd_m, columns=10):
 
 
 @pytest.mark.parametrize(("joint_rad", "psd_m"), [(3e-6, 2e-6), (1e-5, 4e-7), (8e-7, 8e-6)])
-def test_both_components_are_found_from_a_wrong_belief(joint_rad, psd_m):
+def test_both_components_are_found_from_a_wrong_prior(joint_rad, psd_m):
     misfit, J, by_joint = draw(np.random.default_rng(7), 300, joint_rad, psd_m)
     parts = parts_of(by_joint, 3e-6, np.full((300, 4), 2e-6))
     found = variance.estimate((NoisyRows(misfit, J, parts, (0, 1)),), 2, np.zeros(10), np.zeros(10))
@@ -40,7 +40,7 @@ def test_restricted_likelihood_is_not_biased_by_many_parameters():
     assert total_power == pytest.approx(1.0, abs=0.12)  # plain maximum likelihood would give one half
 
 
-def test_few_residuals_leave_the_noise_in_doubt_and_widen_sigma():
+def test_few_residuals_leave_the_noise_uncertain_and_widen_sigma():
     few, many = (_degrees_of_freedom(n) for n in (12, 300))
     assert few < 60
     assert many > 200
@@ -50,4 +50,4 @@ def _degrees_of_freedom(n):
     misfit, J, by_joint = draw(np.random.default_rng(8), n, 3e-6, 2e-6)
     parts = parts_of(by_joint, 3e-6, np.full((n, 4), 2e-6))
     found = variance.estimate((NoisyRows(misfit, J, parts, (0, 1)),), 2, np.zeros(10), np.zeros(10))
-    return float(np.median(variance.doubt((NoisyRows(misfit, J, parts, (0, 1)),), np.zeros(10), found)))
+    return float(np.median(variance.dof((NoisyRows(misfit, J, parts, (0, 1)),), np.zeros(10), found)))

@@ -80,9 +80,9 @@ def case(request):
 
 
 def whole(rows, sources, information, deviation):
-    believed = np.flatnonzero(information)
-    misfit = np.concatenate([*(each.misfit.ravel() for each in rows), deviation[believed]])
-    jacobian = np.concatenate([*(each.jacobian.reshape(-1, PARAMS) for each in rows), np.eye(PARAMS)[believed]])
+    with_prior = np.flatnonzero(information)
+    misfit = np.concatenate([*(each.misfit.ravel() for each in rows), deviation[with_prior]])
+    jacobian = np.concatenate([*(each.jacobian.reshape(-1, PARAMS) for each in rows), np.eye(PARAMS)[with_prior]])
     parts, fixed = [np.zeros((len(misfit), len(misfit))) for _ in range(sources)], np.zeros((len(misfit), len(misfit)))
     first = 0
     for each in rows:
@@ -94,7 +94,7 @@ def whole(rows, sources, information, deviation):
                 into[at, at] += part[j]
         first += ROWS * k
     prior = np.arange(first, len(misfit))
-    fixed[prior, prior] = 1.0 / information[believed]
+    fixed[prior, prior] = 1.0 / information[with_prior]
     return Plain(misfit, jacobian, parts, fixed)
 
 

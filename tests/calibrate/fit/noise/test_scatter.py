@@ -30,7 +30,7 @@ def test_of_few_rows_a_coordinate_that_a_fit_reaches_everywhere_is_no_better_tha
     assert each[-1] / each[0] == pytest.approx(20.0 if len(alike) > 1 else 1.0, rel=0.5)
 
 
-def test_a_gross_error_is_not_tame_and_readings_of_which_each_seems_wild_all_are() -> None:
+def test_a_gross_error_is_not_tame_and_readings_of_which_each_seems_outlying_all_are() -> None:
     misfit = np.random.default_rng(2).standard_normal((40, 3))
     misfit[7] *= 100.0
     assert np.flatnonzero(~tame(misfit, 1.0)).tolist() == [7]

@@ -75,8 +75,8 @@ def away(fit):
     both = np.zeros((6, len(names)))
     for joint in range(1, 7):
         both[joint - 1, [names.index(f"joint{joint}.zero"), names.index(f"encoder{joint}.zero")]] = 1.0
-    told = [names.index(f"joint{joint}.zero") for joint in range(1, 7)]
-    both = both[np.diag(fit.fit.covariance)[told] > 0.0]
+    zeros = [names.index(f"joint{joint}.zero") for joint in range(1, 7)]
+    both = both[np.diag(fit.fit.covariance)[zeros] > 0.0]
     values = both @ fit.fit.theta
     return float(values @ np.linalg.solve(both @ fit.fit.covariance @ both.T, values)), len(both)
 
@@ -181,6 +181,6 @@ def test_nothing_changes_without_second_encoders(rig, drawn):
     samples = drawn(1, OWN_RAD)
     plain = Samples({name: v for name, v in samples.columns.items() if not name.startswith("enc")}, 6)
     found = instruments_for_fit(rig, plain, FitPlan(schema=1))
-    assert found.weighting.sharing(found.start, found.weighting.believed) is found.weighting
+    assert found.weighting.sharing(found.start, found.weighting.assumed_factors) is found.weighting
     assert found.weighting.problem(found.start).witnessed is None
     assert fit_geometry(session_of(rig, plain)).noise.shared is None

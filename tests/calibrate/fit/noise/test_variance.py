@@ -10,13 +10,13 @@ from calibrate.fit.noise.variance import LOG_VARIANCE_PRIOR, MAX_STEPS
 from calibrate.model.problem import parts_of
 
 
-def drawn(joint_rad, psd_m, believed=(3e-6, 2e-6), n=200, columns=12, seed=1):
+def drawn(joint_rad, psd_m, assumed=(3e-6, 2e-6), n=200, columns=12, seed=1):
     """Spots of `n` poses after a linear fit, joints and detectors of these sizes."""
     rng = np.random.default_rng(seed)
     by_joint = rng.normal(0, 0.5, (n, 4, 6))
     J = rng.normal(size=(n, 4, columns))
     misfit = np.einsum("nij,nj->ni", by_joint, rng.normal(0, joint_rad, (n, 6))) + rng.normal(0, psd_m, (n, 4))
-    parts = parts_of(by_joint, believed[0], np.full((n, 4), believed[1]))
+    parts = parts_of(by_joint, assumed[0], np.full((n, 4), assumed[1]))
     return NoisyRows(misfit + J @ rng.normal(0, 1e-6, columns), J, parts, (0, 1))
 
 
@@ -66,11 +66,11 @@ def test_a_small_source_that_is_there_is_not_at_zero():
     assert abs(found.factor[0] - 0.2) < 4.0 * found.factor_sigma[0]
 
 
-@pytest.mark.parametrize("believed", [(3e-5, 2e-7), (1e-7, 5e-5), (1e-7, 1e-7), (1e-4, 1e-4)])
-def test_beliefs_that_are_wrong_by_far_are_left_behind(believed):
-    found = estimate(drawn(3e-6, 2e-6, believed))
+@pytest.mark.parametrize("assumed", [(3e-5, 2e-7), (1e-7, 5e-5), (1e-7, 1e-7), (1e-4, 1e-4)])
+def test_priors_that_are_wrong_by_far_are_left_behind(assumed):
+    found = estimate(drawn(3e-6, 2e-6, assumed))
     assert found.converged
-    right = np.array([3e-6, 2e-6]) / believed
+    right = np.array([3e-6, 2e-6]) / assumed
     assert np.all(np.abs(found.factor / right - 1.0) < 0.25)
 
 

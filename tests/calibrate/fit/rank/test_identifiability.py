@@ -38,7 +38,7 @@ def test_a_sum_that_alone_is_seen_names_both_and_holds_the_joint_zero():
     assert seen.reason("joint2.zero") is None
 
 
-def test_two_separate_losses_are_told_apart():
+def test_two_separate_losses_are_distinguished():
     J = np.kron(np.eye(2), np.ones((2, 2))) * 100.0
     seen = analyse(J, names("joint1.zero", "placement1.yaw", "laser.tilt_u", "joint6.zero"))
     assert {c.words for c in seen.combinations} == {
@@ -215,7 +215,7 @@ def four_poses(request, sessions, ur5e_exact):
     )
 
 
-def test_the_papers_failure_is_told_before_any_number(four_poses):
+def test_the_papers_failure_is_reported_before_any_number(four_poses):
     """All six offsets free: J2 and J3 ran into their bounds in all six of its data sets."""
     fit = solve(four_poses, max_steps=2000)
     seen = analyse(four_poses.jacobian(fit.theta), four_poses.parameters)

@@ -88,13 +88,13 @@ def tracker(request, ur5e_truth):
     rig = load_rig(request.config.rootpath / "rigs" / "ur5e-dual-psd.toml")
     q_rad = rng.uniform(-2.5, 2.5, (60, 6))
     point_m = np.array([0.02, 0.01, 0.08])
-    believed = transform([1.5, 0.4, 0.3], [0.1, -0.2, 2.0])
+    with_prior = transform([1.5, 0.4, 0.3], [0.1, -0.2, 2.0])
     R = Rotation.from_rotvec([0.1, -0.2, 2.0]) * Rotation.from_rotvec(rng.normal(0, 2e-3, 3))
     origin_m = np.array([1.5, 0.4, 0.3]) + rng.normal(0, 3e-3, 3)
     base = np.array([(truth.flange(q) @ [*point_m, 1.0])[:3] for q in q_rad + truth.zeros])
     seen = R.inv().apply(base - origin_m) + rng.normal(0, POSITION_SIGMA_M, base.shape)
     arm = dual_psd_chain(rig, np.ones(1, dtype=int), np.ones(1, dtype=int)).model
-    chain = SensorChain(arm, Position(Target(point_m + 1e-3), Device(believed)))
+    chain = SensorChain(arm, Position(Target(point_m + 1e-3), Device(with_prior)))
     return determined(Problem(chain, chain.parameters, q_rad, seen, np.tile(np.eye(3) / POSITION_SIGMA_M, (60, 1, 1))))
 
 
@@ -131,7 +131,7 @@ def scipy_answer(problem, name):
     scale = plausible_sizes(problem.parameters)[free]
     prior = np.array([problem.parameters[i].prior for i in free])
     start = start_values(problem.parameters)
-    believed = np.flatnonzero(np.isfinite(prior))
+    with_prior = np.flatnonzero(np.isfinite(prior))
 
     def full(x):
         theta = start.copy()
@@ -139,10 +139,10 @@ def scipy_answer(problem, name):
         return theta
 
     def rows(x):
-        return np.concatenate([problem.residual(full(x)), ((x - start[free]) / prior)[believed]])
+        return np.concatenate([problem.residual(full(x)), ((x - start[free]) / prior)[with_prior]])
 
     def slope(x):
-        return np.concatenate([problem.jacobian(full(x))[:, free], np.diag(1.0 / prior)[believed]])
+        return np.concatenate([problem.jacobian(full(x))[:, free], np.diag(1.0 / prior)[with_prior]])
 
     tight = {"xtol": 1e-15, "ftol": None, "gtol": 1e-15, "max_nfev": 300}
     found = least_squares(rows, start[free], jac=slope, method=name, x_scale=scale, **tight)

@@ -56,7 +56,7 @@ def test_weight_and_curvature_are_the_slopes_of_the_cost(loss):
 
 @pytest.mark.parametrize("method", list(Method))
 @pytest.mark.parametrize("loss", ROBUST, ids=str)
-def test_blunders_do_not_move_the_answer(loss, method):
+def test_gross_errors_do_not_move_the_answer(loss, method):
     problem = curve(np.random.default_rng(1), bad=9)
     fit = solve(problem, loss=loss, method=method)
     assert fit.status is Status.CONVERGED

@@ -118,7 +118,7 @@ def test_without_tolerance_the_links_are_held_and_zeros_stay_free():
 
 
 @pytest.mark.parametrize("model", list(ARMS))
-def test_a_free_belief_frees_the_links_without_opinion_and_held_frees_the_zeros_only(model):
+def test_a_free_prior_frees_the_links_without_opinion_and_held_frees_the_zeros_only(model):
     free, held = arm_of(rig_of(model), FREE), arm_of(rig_of(model), HELD_NOMINAL)
     assert {p.name for p in held.parameters if p.free} == {f"joint{i}.zero" for i in range(1, 7)}
     assert all(p.prior == np.inf for p in free.parameters)

@@ -82,7 +82,7 @@ def test_taken_as_parallel_leaves_the_error_of_the_small_angle():
     assert 0.0 < new.error.position_rms_m < new.error.position_max_m < 2e-4 * reach
 
 
-def test_a_first_axis_beside_the_base_moves_the_base_of_a_table():
+def test_a_first_axis_off_the_base_moves_the_base_of_a_table():
     joints = (Joint(-3.0, 3.0, 0.1, 0.3, 0.2, 0.4), *(Joint(-3.0, 3.0, 0.3, 1.2, 0.1, 0.0),) * 3)
     arm = Arm(ArmModel.MDH, joints, flange=Pose((0.0, 0.0, 0.1)))
     new = convert(arm, ArmModel.DH)

@@ -63,7 +63,7 @@ def test_the_two_numbers_of_a_disc_are_its_geometry_to_the_square_of_its_eccentr
     assert np.abs(apart).max() < 2.0 * off**2
 
 
-def test_discs_are_unknowns_only_where_the_rig_doubts_them():
+def test_discs_are_unknowns_only_where_the_rig_leaves_them_open():
     centred = msgspec.structs.replace(RIG, tolerance=msgspec.structs.replace(RIG.tolerance, eccentricity_rad=None))
     plain = arm_of(centred)
     assert with_discs(plain, centred) is plain

@@ -111,10 +111,10 @@ def test_sizes_have_units_and_sentences_name_sizes_that_exist(drivers):
             assert any(name.endswith(ending) for ending, _ in UNITS), (term.key, name)
         wanted = {name for _, name, _, _ in string.Formatter().parse(term.sentence) if name}
         assert wanted <= set(sizes), term.key
-        told = term.says(sizes)
-        assert told.count("±") == len(re.findall(r"\{\w+\}", term.sentence)), term.key
-        assert "+-" not in told
-        assert "{" not in told
+        lines = term.says(sizes)
+        assert lines.count("±") == len(re.findall(r"\{\w+\}", term.sentence)), term.key
+        assert "+-" not in lines
+        assert "{" not in lines
 
 
 def test_names_are_those_of_the_published_lists(drivers):

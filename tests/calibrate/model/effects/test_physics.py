@@ -175,7 +175,7 @@ def brief(effect, drivers, variant=time_laws.FOR_A_WHILE):
 
 
 @pytest.mark.parametrize(("effect", "family"), [(BASE_MOVED, "cones"), (LASER_MOVED, "dual-psd")])
-def test_what_is_put_back_is_elsewhere_between_two_times_only(effect, family):
+def test_what_is_put_back_is_at_another_place_between_two_times_only(effect, family):
     drivers = full_session(family).drivers
     term, t = brief(effect, drivers), np.sort(drivers.t_s)
     moved = np.any(term.basis(drivers, (t[[39, 79]] + t[[40, 80]]) / 2.0) != 0.0, axis=(1, 2))

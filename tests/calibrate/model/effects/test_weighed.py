@@ -12,7 +12,7 @@ from calibrate.model.effects.base_compliance import EFFECT as BASE
 from calibrate.model.effects.gravity import stated_torque_nm
 from calibrate.model.effects.joint_compliance import EFFECT as JOINT
 from calibrate.model.effects.link_bending import EFFECT as LINK
-from calibrate.model.effects.loads import MASS_SHARE, doubtful_rigs, stated_masses
+from calibrate.model.effects.loads import MASS_SHARE, possible_rigs, stated_masses
 from calibrate.model.effects.psd_gain import EFFECT as GAIN
 from tests.calibrate.model.effects.conftest import full_session
 
@@ -35,7 +35,7 @@ def term_of(effect, drivers, where, variant):
     return next(t for t in effect.terms(drivers) if t.port.where == where and t.variant == variant)
 
 
-def test_a_centre_is_told_in_the_link_frame_of_the_notation(drivers):
+def test_a_centre_is_reported_in_the_link_frame_of_the_notation(drivers):
     """Standard Denavit-Hartenberg: at the link's end. Modified, local exponentials: where the link starts to turn."""
     com, link, pose = (0.02, -0.05, 0.1), 2, 7
     at_end = stated_masses(weighed(drivers, com_m=com))[link - 1]
@@ -124,7 +124,7 @@ def test_corrections_keep_their_meaning_on_a_rig_that_states_the_mass_of_the_too
     stated = weighed(drivers)
     stated = replace(stated, rig=structs.replace(stated.rig, tool=structs.replace(stated.rig.tool, mass_kg=None)))
     term = term_of(JOINT, stated, "joint2.angle", "masses corrected")
-    off = doubtful_rigs(stated)[-1]
+    off = possible_rigs(stated)[-1]
     assert off.tool.mass_kg is not None
     plain, moved = term.basis(stated, NOTHING), term.basis(replace(stated, rig=off), NOTHING)
     assert moved.shape == plain.shape

@@ -46,8 +46,8 @@ def fitted(rig, samples):
 
 
 def found_sigmas(fit):
-    believed = [np.max(sigma) for sigma in fit.weighting.measured[0].own_sigma.values()]
-    return np.exp(0.5 * fit.factors.log_variance[1:]) * believed
+    assumed = [np.max(sigma) for sigma in fit.weighting.measured[0].own_sigma.values()]
+    return np.exp(0.5 * fit.factors.log_variance[1:]) * assumed
 
 
 def away(fit, q, place, turn):
@@ -127,7 +127,7 @@ def test_a_gross_error_is_named_and_left_out(rig, session):
     columns = session.columns(q)
     columns[PLACE[0]][17] += 0.02
     result = identify(rig, table(q, **columns), rng=np.random.default_rng(1))
-    assert [blunder.rows for blunder in result.blunders] == [(17,)]
+    assert [gross_error.rows for gross_error in result.blunders] == [(17,)]
 
 
 @pytest.mark.parametrize(

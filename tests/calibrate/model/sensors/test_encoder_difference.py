@@ -39,8 +39,8 @@ def test_the_angles_of_second_encoders_are_about_the_controllers_zero():
 
 
 def test_an_encoder_that_does_not_follow_its_joint_is_left_out_by_name():
-    wild = np.random.default_rng(3).uniform(0.0, 6.0, ROWS)
-    samples = table(enc2_rad=wild)
+    random_rad = np.random.default_rng(3).uniform(0.0, 6.0, ROWS)
+    samples = table(enc2_rad=random_rad)
     assert differences(samples).used == (1, 3)
     assert not_following(samples) == ("enc2_rad",)
     (sentence,) = unused_columns(samples)

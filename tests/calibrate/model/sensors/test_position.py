@@ -18,6 +18,6 @@ def test_a_position_is_the_target_seen_from_the_device():
     assert_allclose(sensor.expect(np.zeros(9), T_base_flange[None])[0], expected, atol=1e-14)
 
 
-def test_a_belief_about_the_device_becomes_a_prior_and_none_stays_none():
+def test_a_tolerance_of_the_device_becomes_a_prior_and_none_stays_none():
     assert {p.prior for p in Device(np.eye(4)).parameters} == {np.inf}
     assert [p.prior for p in Device(np.eye(4), (1e-3, 2e-3)).parameters] == [1e-3] * 3 + [2e-3] * 3

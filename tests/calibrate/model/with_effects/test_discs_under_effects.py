@@ -38,7 +38,7 @@ def test_frames_without_effects_are_those_of_the_geometry():
     assert np.max(np.abs(frames[:, -1] - drawn.flange(Q_RAD))) > 1e-4
 
 
-def test_discs_act_beside_an_effect(monkeypatch):
+def test_discs_act_next_to_an_effect(monkeypatch):
     """Play of joint 1 turns the arm as a whole: apart from that turn the flange is that of the discs."""
     predictor = with_disc()
     monkeypatch.setattr(Predictor, "of", classmethod(lambda cls, file: predictor))

@@ -86,7 +86,7 @@ EMPTY = {"payload_kg": (0.0,) * 4}
 HUNG = dict(zip(CENTRE, (0.15, 0.0, 0.0), strict=True))
 
 
-def test_a_stated_centre_is_used_and_nothing_is_doubted():
+def test_a_stated_centre_is_used_and_nothing_is_uncertain():
     down, sigma, notes = droop_m(soft(EMPTY), payload_kg=LOAD_KG, **HUNG)
     np.testing.assert_allclose(down, sag_m(ARM_M + 0.15), rtol=1e-3)
     assert np.all(sigma == 0.0)
@@ -131,17 +131,17 @@ def test_a_load_whose_centre_is_taken_from_the_session_is_named_too():
     assert "taken where it was in the session" in notes[0]
 
 
-@pytest.mark.parametrize(("com", "doubted"), [("", True), ("com_m = [0.0, 0.0, 0.1]\n", False)])
-def test_a_tool_without_a_centre_of_mass_widens_sigma_of_every_row(com, doubted):
+@pytest.mark.parametrize(("com", "uncertain"), [("", True), ("com_m = [0.0, 0.0, 0.1]\n", False)])
+def test_a_tool_without_a_centre_of_mass_widens_sigma_of_every_row(com, uncertain):
     rig = RIG.replace("[tool]\n", f"[tool]\nmass_kg = {LOAD_KG}\n{com}")
     model = soft(EMPTY, rig)
     found = predict_with_physics(model, rows(payload_kg=0.0))
-    np.testing.assert_allclose(found.columns["s_z_m"], doubted * sag_m(UNSTATED_CENTRE_M), rtol=1e-3, atol=1e-15)
+    np.testing.assert_allclose(found.columns["s_z_m"], uncertain * sag_m(UNSTATED_CENTRE_M), rtol=1e-3, atol=1e-15)
     named = [note.startswith("rig upright: [tool] com_m is not stated (state it)") for note in found.notes]
-    assert named == [True] * doubted
+    assert named == [True] * uncertain
 
 
-def test_in_its_own_session_nothing_is_doubted():
+def test_in_its_own_session_nothing_is_uncertain():
     """The fit has seen these rows under their load."""
     found = predict_with_physics(soft(EMPTY), rows(payload_kg=LOAD_KG), same_session=True)
     assert np.all(found.columns["s_z_m"] == 0.0)

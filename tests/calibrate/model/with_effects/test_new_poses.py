@@ -7,7 +7,7 @@ import pytest
 
 from calibrate.diagnose.assess import limits
 from calibrate.diagnose.assess.free_space_change import free_space_change
-from calibrate.diagnose.new_poses.longer_session import NewPoses, elsewhere
+from calibrate.diagnose.new_poses.longer_session import NewPoses, at_new_poses
 from calibrate.diagnose.state.fitted import fit_geometry
 from calibrate.diagnose.state.session import session_of
 from calibrate.model.effects.term import Accepted
@@ -43,7 +43,7 @@ def kinds_of(state):
     return list(first.values())
 
 
-def test_every_cause_is_told_where_it_was_measured_as_it_was_there(fitted):
+def test_every_cause_is_reported_where_it_was_measured_as_it_was_there(fitted):
     drivers, rng = fitted.drivers, np.random.default_rng(3)
     again = rng.choice(len(drivers.q_rad), AGAIN, replace=False)
     copies = int(limits.POSES_FOR_ONE_NEW * AGAIN / len(drivers.q_rad))
@@ -53,9 +53,9 @@ def test_every_cause_is_told_where_it_was_measured_as_it_was_there(fitted):
     for term in kinds:
         one = drawn(term, drivers, rng)
         was = term.basis(drivers, one.inner) @ one.coefficients
-        told = carried_over(one, drivers, longer)
-        assert told is not None, term.key
-        away = told[-AGAIN:] @ one.coefficients - was[again]
+        carried = carried_over(one, drivers, longer)
+        assert carried is not None, term.key
+        away = carried[-AGAIN:] @ one.coefficients - was[again]
         assert np.max(np.abs(away)) <= BY_POSES * np.max(np.abs(was)), term.key
 
 
@@ -75,7 +75,7 @@ def test_causes_that_are_the_same_have_no_level():
     assert np.all(level == 0.0)
 
 
-def test_free_space_is_told_with_a_joint_that_yields_whatever_its_masses(fitted):
+def test_free_space_is_reported_with_a_joint_that_yields_whatever_its_masses(fitted):
     """Columns may be chosen by the poses of the session; the error that they made anywhere is told all the same."""
     soft = [t for t in fitted.candidates() if (t.physics, t.port.where) == ("joint-compliance", "joint2.angle")]
     one = max((drawn(t, fitted.drivers, np.random.default_rng(1)) for t in soft), key=lambda a: len(a.coefficients))
@@ -88,6 +88,6 @@ def test_free_space_is_told_with_a_joint_that_yields_whatever_its_masses(fitted)
 def test_new_poses_are_as_warm_as_those_they_are_like(fitted):
     drivers = fitted.drivers
     like = np.array([3, 7])
-    there = elsewhere(fitted, NewPoses(drivers.q_rad[like], np.ones((2, drivers.n_joints)), like))
+    there = at_new_poses(fitted, NewPoses(drivers.q_rad[like], np.ones((2, drivers.n_joints)), like))
     for place, values in drivers.temperatures_degC.items():
         assert there.drivers.temperatures_degC[place][-2:] == pytest.approx(values[like])

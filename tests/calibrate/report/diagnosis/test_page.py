@@ -143,15 +143,15 @@ def test_an_interval_holds_95_of_100_sizes():
     assert interval_words("samples_count", SizeRecord(20.0, 0.0)) == "\N{EN DASH}"
 
 
-def test_the_largest_size_that_a_machine_shows_stands_beside(text):
+def test_the_largest_size_that_a_machine_shows_stands_next_to_it(text):
     assert "a machine shows at most" not in text
     known = msgspec.structs.replace(FILE, findings=(msgspec.structs.replace(FINDING, plausible_to=3e-4),))
     assert "300 µrad" in "".join(chapters_of(known, 6)).replace("\N{NO-BREAK SPACE}", " ")
 
 
 def test_the_verdict_says_whether_noise_is_what_remains():
-    told = msgspec.structs.replace(FILE, unexplained=None, also_unexplained=())
-    assert verdict_words(told).endswith("what remains is noise.")
+    lines = msgspec.structs.replace(FILE, unexplained=None, also_unexplained=())
+    assert verdict_words(lines).endswith("what remains is noise.")
     assert "stays without a name" in verdict_words(FILE)
 
 
@@ -186,8 +186,8 @@ def test_noise_is_said_only_where_it_is_stated_and_what_is_wrong_with_the_statem
 
 def test_every_split_is_compared_with_the_noise():
     last = SplitRecord("last block", "dual-psd", 12, 0, 4.1e-5, 6.3e-6, 0.9, 0.99)
-    told = msgspec.structs.replace(FILE, unexplained=None, splits=(*FILE.splits, last))
-    assert "missed by 3 times the noise" in verdict_words(told)
+    lines = msgspec.structs.replace(FILE, unexplained=None, splits=(*FILE.splits, last))
+    assert "missed by 3 times the noise" in verdict_words(lines)
 
 
 SMALLEST = SmallestRecord(

@@ -47,7 +47,7 @@ def test_physics_that_the_model_lacks_is_seen_along_its_joint(arm_session):
     assert any("missing physics" in do for do in judged.advice)
 
 
-def test_noise_below_the_stated_is_advice_and_no_doubt(healthy):
+def test_noise_below_the_stated_is_advice_and_no_uncertainty(healthy):
     noise = healthy.model.noise | {"chi2_stated": 80.0, "dof": 300, "alarm": "BELOW_STATED"}
     judged = session_verdict(changed(healthy, noise=noise))
     assert judged.trust is Trust.GOOD
@@ -61,7 +61,7 @@ def test_unseen_rows_far_beyond_the_noise_call_for_care(healthy):
     assert "3.00 times what noise and sigmas predict" in judged.reasons[0]
 
 
-def test_unseen_rows_that_lie_elsewhere_call_for_care_even_if_their_misfit_was_to_be_expected(healthy):
+def test_unseen_rows_that_lie_at_another_place_call_for_care_even_if_their_misfit_was_to_be_expected(healthy):
     """Such as the last block of a session, in postures of its own: missed by four times the noise, as predicted."""
     far = tuple(msgspec.structs.replace(p, chi_after=4.0, chi_predicted=1.0) for p in healthy.model.proofs)
     judged = session_verdict(changed(healthy, proofs=far))
@@ -98,7 +98,7 @@ def test_a_model_of_a_diagnosis_is_trusted_as_any_other(arm_session):
     assert (judged.trust, judged.reasons) == (Trust.GOOD, ())
 
 
-def test_physics_that_a_diagnosis_found_is_a_doubt_only_where_the_model_is_not_of_a_diagnosis(healthy, arm_session):
+def test_physics_that_a_diagnosis_found_calls_for_care_only_where_the_model_is_not_of_a_diagnosis(healthy, arm_session):
     found = DiagnosisFile(1, "mismatch", 1e-5, 1e-4, 1e-5, (), None, ())
     assert session_verdict(healthy, found).trust is Trust.CARE
     session = arm_session(120)

@@ -14,7 +14,7 @@ from calibrate.report.figures.rig_scene import (
 
 # The drawn beam ends on observed spots, the computed one does not know them: they differ by the noise (some um) over
 # the distance of the faces (0.08 m).
-BEAM_DOUBT = 1e-3
+BEAM_TOLERANCE = 1e-3
 
 
 @pytest.fixture(scope="module")
@@ -46,7 +46,7 @@ def test_the_beam_is_reflected_at_equal_angles(drawn: Scene, rig: FittedRig) -> 
     for arm in drawn.arms:
         normal = rig.faces(arm.placement)[arm.first_psd - 1][:3, 2]
         arriving, leaving = unit(arm.beam_m[1] - arm.beam_m[0]), unit(arm.beam_m[2] - arm.beam_m[1])
-        np.testing.assert_allclose(leaving, arriving - 2.0 * (arriving @ normal) * normal, atol=BEAM_DOUBT)
+        np.testing.assert_allclose(leaving, arriving - 2.0 * (arriving @ normal) * normal, atol=BEAM_TOLERANCE)
 
 
 def test_faces_are_squares_of_the_size_in_the_rig_file(drawn: Scene, rig: FittedRig) -> None:

@@ -63,9 +63,9 @@ def test_a_pose_left_out_is_missed_as_by_a_fit_of_the_others(known, arm, row):
     others = np.delete(np.arange(known.problem.rows), row)
     refitted = solve(known.problem.with_parameters(parameters).select(others), start=known.theta).theta
     missed = known.problem.blocks[0].misfit(known.problem.of_block(0, refitted))[row]
-    told = deleted_misfit(known.problem, 0, known.theta, arm.covariance)
-    assert told is not None
-    np.testing.assert_allclose(told[row], missed, atol=0.02 * np.linalg.norm(missed))
+    lines = deleted_misfit(known.problem, 0, known.theta, arm.covariance)
+    assert lines is not None
+    np.testing.assert_allclose(lines[row], missed, atol=0.02 * np.linalg.norm(missed))
 
 
 def test_errors_of_poses_left_out_are_larger_than_those_of_the_fit(known, arm):
@@ -97,9 +97,9 @@ def test_what_the_data_cannot_determine_is_not_drawn(known):
     model = msgspec.structs.replace(known.model, free_space=hidden)
     why = session_arm(replace(known, model=model))
     assert isinstance(why, str)
-    told = workspace(why, None, "")
-    assert "an unseen combination moves the target" in told
-    assert "<svg" not in told
+    lines = workspace(why, None, "")
+    assert "an unseen combination moves the target" in lines
+    assert "<svg" not in lines
 
 
 @pytest.mark.parametrize("view", [SIDE, ABOVE])
