@@ -123,7 +123,7 @@ class Listed:
 
     def function(self, term: Form, inner: Floats) -> Floats:
         """(sample, m) along each direction of a term; kept where a menu asks for it and it is dear."""
-        if term.open or not all(value in spec.grid for value, spec in zip(inner, term.inner, strict=False)):
+        if not all(value in spec.grid for value, spec in zip(inner, term.inner, strict=False)):
             return term.function(self.drivers, inner)
         key = (term.function, inner.tobytes())
         if key not in self.values:

@@ -115,13 +115,14 @@ Floats = NDArray[np.float64]
 
 SHOWN = (0.5, 99.5)  # percentiles of the residual on the axis: where a port is hardly felt, points fly far
 ROOM = 1.6  # times what is shown
+MARGINS = {"left": 0.17, "right": 0.98, "bottom": 0.17, "top": 0.9}  # of the figure: five digits on the left
 LINE_LEVELS = 6  # different driver values: below, the curve is a few levels and drawn as points
 
 
 def pulled_figure(name: str, curve: CurveRecord, *, single: bool) -> Html:
     """`single`: the cause depends on the drawn driver alone, so that its curve is a line."""
     says = f"residual without this cause, pulled back to its place, against {curve.driver}, with the fitted curve"
-    return drawn(f"pulled-{name}", says, 4.8, 3.3, lambda figure: _paint_curve(figure, curve, single=single))
+    return drawn(f"pulled-{name}", says, 4.8, 3.3, lambda figure: _paint_curve(figure, curve, single=single), MARGINS)
 
 
 def _paint_curve(figure: Figure, curve: CurveRecord, *, single: bool) -> None:

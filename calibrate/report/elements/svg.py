@@ -2,7 +2,7 @@
 
 import io
 import re
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Literal
 
@@ -65,10 +65,23 @@ def house_style() -> Generator[None]:
         yield
 
 
-def drawn(name: str, says: str, width_in: float, height_in: float, paint: Callable[[Figure], None]) -> Html:
-    """What `paint` draws, as inline SVG. `name` is unique in the page; `says` is read to who cannot see it."""
+def drawn(
+    name: str,
+    says: str,
+    width_in: float,
+    height_in: float,
+    paint: Callable[[Figure], None],
+    margins: Mapping[str, float] | None = None,
+) -> Html:
+    """What `paint` draws, as inline SVG. `name` is unique in the page; `says` is read to who cannot see it.
+
+    `margins` as of `Figure.subplots_adjust`, for figures of one kind on one page: a layout that fits each would take as
+    long as drawing it.
+    """
     with house_style():
-        figure = Figure(figsize=(width_in, height_in), layout="constrained")
+        figure = Figure(figsize=(width_in, height_in), layout=None if margins else "constrained")
+        if margins:
+            figure.subplots_adjust(**margins)
         paint(figure)
         text = io.StringIO()
         FigureCanvasSVG(figure).print_svg(text)  # not savefig, which lays out and draws everything once more before
