@@ -85,9 +85,9 @@ def diagnose_command(
         planned = "" if plan_out is None else plan_next(found, plan_out)
     reported = msgspec.structs.replace(file, next=(*file.next, planned)) if planned else file
     page = write_diagnosis_report(out.with_suffix(".html") if report is None else report, source, reported)
-    if not json:
-        for line in filter(None, (planned, f"diagnosis: {out}", modelled, f"report: {page}")):
-            console.print(line, markup=False, highlight=False)
+    said = Console(stderr=True) if json else console  # nobody takes a model that was kept for a new one
+    for line in filter(None, (planned, f"diagnosis: {out}", modelled, f"report: {page}")):
+        said.print(line, markup=False, highlight=False)
 
 
 def _write_model(path: Path, model: ModelFile, file: DiagnosisFile) -> str:

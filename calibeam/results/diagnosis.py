@@ -20,6 +20,7 @@ from calibrate.diagnose.record.schema import (
     DiagnosisFile,
     IncompleteRecord,
     RigRecord,
+    no_better_with_physics,
 )
 from calibrate.diagnose.record.to_file import file_of
 from calibrate.diagnose.stages import Stage, Stages
@@ -147,22 +148,6 @@ def refuse_wrong_file(found: Diagnosed, path: Path) -> None:
         said = "; ".join(f"{one.stage.value}: {one.reason}" for one in found.incomplete)
         raise DataError(f"no diagnosis, {said} (also in {path})")
     raise DataError(f"{found.why_not} (also in {path}); no physics is sought before that is put right")
-
-
-def no_better_with_physics(file: DiagnosisFile) -> str:
-    """Why a model with the physics does not replace one of geometry alone; empty where it does.
-
-    It has to be better on unseen rows for certain, by one way to split at least, and worse for certain by none.
-    """
-    if not file.findings:
-        return "no cause was found beside the geometry"
-    sure = [(one.removed_low, one.removed_high) for one in file.splits]
-    known = [(low, high) for low, high in sure if low is not None and high is not None]
-    if not known:
-        return "there is no proof on unseen rows"
-    if any(high < 0.0 for _, high in known):
-        return "on unseen rows it is worse with the physics"
-    return "" if any(low > 0.0 for low, _ in known) else "on unseen rows it is not better for certain with the physics"
 
 
 def why_kept(path: Path, model: ModelFile, file: DiagnosisFile) -> str:

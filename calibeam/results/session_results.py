@@ -19,7 +19,7 @@ from calibeam.results.identification import (
     session_model,
     write_session_model,
 )
-from calibrate.diagnose.record.schema import DiagnosisFile
+from calibrate.diagnose.record.schema import DiagnosisFile, no_better_with_physics
 from calibrate.diagnose.with_model import model_of_diagnosis
 from calibrate.errors import DataError
 from calibrate.fit.identify.result import Identification
@@ -136,7 +136,7 @@ def write_session_diagnosis(recording: Recording, folder: Path) -> tuple[Diagnos
 
     No diagnosis where there is too little for one.
     """
-    from calibeam.results.diagnosis import diagnose_to_file, no_better_with_physics  # a report starts without it
+    from calibeam.results.diagnosis import diagnose_to_file  # a report starts without it
 
     try:
         found, file = diagnose_to_file(recording, folder / DIAGNOSIS_NAME)

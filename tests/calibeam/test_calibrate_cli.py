@@ -6,8 +6,9 @@ import msgspec
 import pytest
 
 from calibeam.cli import run
-from calibeam.results.diagnosis import no_better_with_physics, why_kept
+from calibeam.results.diagnosis import why_kept
 from calibrate.diagnose.record.file import read_diagnosis
+from calibrate.diagnose.record.schema import no_better_with_physics
 from calibrate.model.model_file import read_model
 from simulators.conceal.case import conceal
 from simulators.conceal.case_files import write_case

@@ -255,3 +255,19 @@ class DiagnosisFile(Record, frozen=True):
     changed: Many[ChangedRecord] = ()
     incomplete: Many[IncompleteRecord] = ()  # what could not be looked at, and why
     noise: Many[NoiseRecord] = ()
+
+
+def no_better_with_physics(file: DiagnosisFile) -> str:
+    """Why a model with the physics does not replace one of geometry alone; empty where it does.
+
+    It has to be better on unseen rows for certain, by one way to split at least, and worse for certain by none.
+    """
+    if not file.findings:
+        return "no cause was found beside the geometry"
+    sure = [(one.removed_low, one.removed_high) for one in file.splits]
+    known = [(low, high) for low, high in sure if low is not None and high is not None]
+    if not known:
+        return "there is no proof on unseen rows"
+    if any(high < 0.0 for _, high in known):
+        return "on unseen rows it is worse with the physics"
+    return "" if any(low > 0.0 for low, _ in known) else "on unseen rows it is not better for certain with the physics"

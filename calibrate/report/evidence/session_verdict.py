@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import fdtrc
 
-from calibrate.diagnose.record.schema import DiagnosisFile, SplitRecord
+from calibrate.diagnose.record.schema import DiagnosisFile, SplitRecord, no_better_with_physics
 from calibrate.fit.accuracy import Alarm, checks_nothing
 from calibrate.fit.solvers import Status
 from calibrate.model.model_file import Fields, ModelFile, UnseenRows
@@ -216,9 +216,13 @@ def _reasons_of_diagnosis(found: DiagnosisFile | None, model: ModelFile) -> Iter
         return
     if found.verdict == "mismatch":
         causes = counted(len(found.findings), "cause")
+        no_better = no_better_with_physics(found) if found.findings else ""
         yield (
-            f"Geometry alone does not explain the readings: the diagnosis found {causes}.",
-            "Use the model with the physics, which `calibeam diagnose --model-out` writes.",
+            f"Geometry alone does not explain the readings: the diagnosis found {causes}"
+            + (f", but {no_better}." if no_better else "."),
+            "Measure more poses (`calibeam design` chooses them): they decide whether the causes belong into the model."
+            if no_better
+            else "Use the model with the physics, which `calibeam diagnose --model-out` writes.",
         )
         return
     yield (

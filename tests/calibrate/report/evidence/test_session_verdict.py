@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from acquisition.recording.rig import parse_rig
-from calibrate.diagnose.record.schema import DiagnosisFile
+from calibrate.diagnose.record.schema import DiagnosisFile, FindingRecord, SplitRecord
 from calibrate.report.elements.verdict import Trust
 from calibrate.report.evidence.session_evidence import session_evidence
 from calibrate.report.evidence.session_verdict import session_verdict
@@ -105,6 +105,16 @@ def test_physics_that_a_diagnosis_found_calls_for_care_only_where_the_model_is_n
     recording = session.recording(session.positions())
     with_physics = session_evidence(recording, session.model_of_diagnosis(recording))
     assert session_verdict(with_physics, found).trust is Trust.GOOD
+
+
+@pytest.mark.parametrize(("removed", "recommended"), [((0.3, 0.5), True), ((-0.5, -0.3), False)])
+def test_a_model_with_physics_is_recommended_where_it_would_replace_geometry(healthy, removed, recommended):
+    name = ("joint2.angle", "tau2", "linear", None, "joint-compliance")
+    cause = FindingRecord(*name, {}, 30.0, 0.9, "", (), 1e-3, 20.0, 20.0)
+    split = SplitRecord("random", "position", 20, 0, 1e-4, 5e-5, *removed)
+    found = DiagnosisFile(1, "mismatch", 1e-5, 1e-4, 1e-5, (cause,), None, (), splits=(split,))
+    advice = session_verdict(healthy, found).advice
+    assert any("--model-out" in one for one in advice) is recommended
 
 
 def test_the_one_noisy_source_of_several_is_named(healthy):
