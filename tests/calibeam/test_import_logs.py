@@ -1,6 +1,7 @@
 """Logs of other programs as streams: delays between two clocks with drift, ROS 2 bags, CAN logs through a DBC file."""
 
 import math
+import re
 from pathlib import Path
 
 import can
@@ -277,3 +278,38 @@ def test_frames_of_other_encoders_are_named(tmp_path, way, dbc_rig, capsys):
     dbc_rig.write_text(dbc_rig.read_text().replace("ENCODER6.Angle", "ENCODER9.Angle"))
     assert run(["import", str(tmp_path / "bus.blf"), "--rig", str(dbc_rig), "--out", str(tmp_path / "x.mcap")]) == 1
     assert "no signal 'ENCODER9.Angle'" in capsys.readouterr().err
+
+
+def test_second_encoders_of_some_joints_and_motor_torques_show_a_soft_drive(tmp_path, way):
+    """Motor torques become those of the joints by the gear ratios of the rig file."""
+    soft, ratio = 1e-7, 120.0
+    stamp_s, q_rad = joints(way, rate_hz=250.0)
+    torque_nm = 800.0 * np.sin(2.1 * stamp_s)[:, None] + 500.0 * np.cos(q_rad[:, 1:3])
+    second = q_rad[:, 1:3] - soft * torque_nm
+    headings = ["t_s", *(f"a{i}_deg" for i in range(1, 7)), "e2_deg", "e3_deg", "m2", "m3"]
+    values = np.column_stack([stamp_s, np.degrees(q_rad), np.degrees(second), torque_nm / ratio])
+    lines = [",".join(headings), *(",".join(map(repr, row.tolist())) for row in values)]
+    (tmp_path / "arm.csv").write_text("\n".join(lines), encoding="utf-8")
+    text = re.sub(r"gear_ratio = .*\n", "", RIG.read_text(encoding="utf-8"))
+    (tmp_path / "rig.toml").write_text(text.replace("lower_rad", f"gear_ratio = {ratio}\nlower_rad"), encoding="utf-8")
+    columns = "a1_deg..a6_deg = q, e2_deg e3_deg = enc, m2 m3 [Nm] = motor_tau"
+    imported(tmp_path / "log.mcap", tmp_path / "arm.csv", rig=tmp_path / "rig.toml", more=("--columns", columns))
+    report = examine(devices_of(read(tmp_path / "log.mcap")))
+    found = {one.name.where: one for one in report.findings if one.name.physics == "joint-compliance"}
+    assert set(found) == {"joint2.angle", "joint3.angle"}
+    for one in found.values():
+        size = one.parameters["compliance_rad_per_nm"]
+        assert size.value == pytest.approx(soft, abs=4.0 * size.sigma)
+
+
+def test_columns_of_some_joints_need_the_numbers_of_these_joints(tmp_path, way, capsys):
+    stamp_s, q_rad = joints(way)
+    headings = ["t_s", *(f"q{i}_rad" for i in range(1, 7)), "left", "right"]
+    lines = [",".join(headings)]
+    lines += [",".join(map(repr, row)) for row in np.column_stack([stamp_s, q_rad, q_rad[:, :2]]).tolist()]
+    (tmp_path / "arm.csv").write_text("\n".join(lines), encoding="utf-8")
+    command = ["import", str(tmp_path / "arm.csv"), "--streams", "--rig", str(RIG), "--out", str(tmp_path / "log.mcap")]
+    assert run([*command, "--yes", "--columns", "left right [rad] = enc"]) == 1
+    said = " ".join(capsys.readouterr().err.split())
+    assert "enc of 2 of 6 joints" in said
+    assert "left, right" in said

@@ -54,6 +54,7 @@ class Group:
     columns: tuple[int, ...]
     unit: str
     stated: bool = False
+    joints: tuple[int, ...] = ()  # from 1, where only some joints have a column; else all have one
 
     @property
     def suffix(self) -> str:
@@ -81,7 +82,8 @@ class Group:
     def targets(self, n_joints: int) -> tuple[str, ...]:
         """The columns of samples.csv that come of it."""
         if self.meaning in PER_JOINT:
-            return per_joint(*PER_JOINT[self.meaning], n_joints)
+            of_all = per_joint(*PER_JOINT[self.meaning], n_joints)
+            return tuple(of_all[joint - 1] for joint in self.joints) if self.joints else of_all
         bare = self.meaning.removeprefix(CAMERA)
         prefix = "camera_" if self.meaning.startswith(CAMERA) else ""
         if bare in CONVENTIONS:
@@ -102,10 +104,13 @@ PER_JOINT: Mapping[str, tuple[str, str]] = MappingProxyType(
         "cmd": ("cmd", "_rad"),
         "enc": ("enc", "_rad"),
         "qd": ("qd", "_rad_s"),
+        "tau": ("tau", "_nm"),
+        "motor_tau": ("motor_tau", "_nm"),
         "approach": ("approach", ""),
         "last_move": ("last_move", "_rad"),
     }
 )
+OF_SOME_JOINTS = ("enc", "tau", "motor_tau")  # not every joint need have a second encoder, or a torque
 # folded headings of one column a joint, the number cut off
 _STEMS: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {
@@ -116,6 +121,8 @@ _STEMS: Mapping[str, tuple[str, ...]] = MappingProxyType(
         "cmd": ("cmd", "command", "qcmd", "targetq", "qtarget", "soll", "cmdq"),
         "enc": ("enc", "encoder"),
         "qd": ("qd", "actualqd", "jointvel"),
+        "tau": ("tau",),
+        "motor_tau": ("motortau",),
         "approach": ("approach",),
         "last_move": ("lastmove",),
     }
@@ -372,8 +379,7 @@ def _stated(sheet: Sheet, n_joints: int, columns: str) -> Iterator[Group]:
             raise SamplesError(f"--columns: '{shown(group.meaning, 40)}' stands twice; give it once")
         taken |= set(group.columns)
         meant |= {group.meaning} - {UNUSED}
-        _check_count(group, n_joints)
-        yield group
+        yield _of_joints(sheet, group, n_joints)
 
 
 def _group(sheet: Sheet, meaning: str, columns: tuple[int, ...], unit: str) -> Group:
@@ -407,6 +413,25 @@ def _check_own(group: Group) -> None:
             f"--columns: '{group.meaning}' alone is no column of one's own; give all that belong together, such as "
             '"A1..A6 [deg] = q" or "X Y Z [mm] = position"'
         )
+
+
+def _of_joints(sheet: Sheet, group: Group, n_joints: int) -> Group:
+    """The group with the joints that its headings number, where it has fewer columns than the arm has joints.
+
+    SamplesError for a number of columns that the meaning does not have.
+    """
+    if group.meaning not in OF_SOME_JOINTS or not 0 < len(group.columns) < n_joints:
+        _check_count(group, n_joints)
+        return group
+    ends = [_NUMBER_AT_END.fullmatch(name_of(sheet, column)) for column in group.columns]
+    joints = tuple(int(end[2]) for end in ends if end)
+    if len(set(joints)) == len(group.columns) and all(0 < joint <= n_joints for joint in joints):
+        return replace(group, joints=joints)
+    names = ", ".join(shown(sheet.headings[column], 30) for column in group.columns)
+    raise SamplesError(
+        f"--columns: {group.meaning} of {len(group.columns)} of {n_joints} joints, and the headings ({names}) do not "
+        f"end in the numbers of these joints, 1 to {n_joints}; rename them, or give a column for each joint"
+    )
 
 
 def _check_count(group: Group, n_joints: int) -> None:

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from acquisition.recording.errors import RecordingError, SamplesError, shown
 from acquisition.recording.files import write_json
-from acquisition.recording.files.explain import spelt, suffix_of
+from acquisition.recording.files.explain import suffix_of
 from acquisition.recording.foreign.column_meanings import (
     CAMERA,
     POSE_MATRIX,
@@ -29,7 +29,7 @@ from acquisition.recording.foreign.column_meanings import (
     understood,
     unit_in,
 )
-from acquisition.recording.foreign.heading_units import AMBIGUOUS, Unit, symbols, unit_of
+from acquisition.recording.foreign.heading_units import AMBIGUOUS, Unit, si_symbol, symbols, unit_of
 from acquisition.recording.foreign.rotations import CONVENTIONS, bad_matrix, bad_quaternion, of_matrices
 from acquisition.recording.foreign.sheet import Raw, Sheet
 from acquisition.recording.recording import Recording
@@ -323,8 +323,7 @@ def _record(table: Understanding, group: Group, samples: Samples | None) -> Colu
         values = np.concatenate([np.empty(0), *(samples.columns[targets[k]] for k in alike)])
     there = values[np.isfinite(values)]
     low, high = (float(there.min()), float(there.max())) if there.size else (None, None)
-    si_unit = "°C" if group.suffix == "degC" else spelt(group.suffix) if group.suffix else ""
-    return ColumnRecord(table.headings(group), group.meaning, group.unit, targets, si_unit, low, high)
+    return ColumnRecord(table.headings(group), group.meaning, group.unit, targets, si_symbol(group.suffix), low, high)
 
 
 def _notes(table: Understanding) -> Iterator[str]:

@@ -11,7 +11,7 @@ from functools import lru_cache
 from types import MappingProxyType
 
 from acquisition.recording.files.bounds import TABLE_COLUMNS
-from acquisition.recording.files.explain import UNITS
+from acquisition.recording.files.explain import UNITS, spelt
 
 
 @dataclass(frozen=True)
@@ -57,8 +57,10 @@ _BY_SYMBOL: Mapping[str, Unit] = MappingProxyType(
     | {symbol.casefold(): Unit(symbol, "degC", 1.0, -273.15) for symbol in _KELVIN}
     | {symbol.casefold(): Unit(symbol, "degC", 5.0 / 9.0, -160.0 / 9.0) for symbol in _FAHRENHEIT}
 )
-# German nouns have a capital.
-_GERMAN_DEGREE = {symbol: Unit(symbol, "rad", _DEGREE) for symbol in ("Grad", "Grd")}
+# Where the case tells: German nouns have a capital, and nm is a nanometre.
+_AS_WRITTEN = {symbol: Unit(symbol, "rad", _DEGREE) for symbol in ("Grad", "Grd")} | {
+    symbol: Unit(symbol, "nm", factor) for symbol, factor in {"Nm": 1.0, "N·m": 1.0, "kNm": 1e3, "Ncm": 1e-2}.items()
+}
 _PLAIN_NUMBER = ("", "1", "-", "—")  # what stands where a column has no unit
 
 _BRACKETED = re.compile(r"(.*?)\s*\[([^\]]*)\]")
@@ -68,17 +70,29 @@ _BEHIND_SPACE = re.compile(r"(.*[^\s/])\s+(\S+)")  # before the stroke: `q1 deg/
 _BEHIND_STROKE = re.compile(r"([^/]*[^\s/])\s*/\s*(\S+)")
 # Behind an underscore only what names of SI columns and of usual exports end with: `bar_s` is no time of a bar.
 _SUFFIXED = re.compile(r"(.+?)_(rad_s|deg_s|rad|mrad|deg|m|cm|mm|um|s|ms|us|ns|kg|g|v|mv|degC|K)", re.IGNORECASE)
+_TORQUE = re.compile(r"((?:motor_)?tau\d+)_nm")  # a name of SI columns of its own: else it would be a nanometre
 
 
 def unit_of(symbol: str) -> Unit | None:
     """The unit of this symbol, in whatever case; None where it is none that is known."""
     # µ (micro) and μ (mu) fold alike
-    return _GERMAN_DEGREE.get(symbol.strip()) or _BY_SYMBOL.get(symbol.strip().casefold())
+    return _AS_WRITTEN.get(symbol.strip()) or _BY_SYMBOL.get(symbol.strip().casefold())
+
+
+def si_symbol(suffix: str) -> str:
+    """What a column in SI that ends with `suffix` counts in, as a person writes it; "" without a suffix."""
+    return {"degC": "°C", "nm": "Nm"}.get(suffix) or (spelt(suffix) if suffix else "")
 
 
 def symbols(suffix: str) -> tuple[str, ...]:
     """What may be written for a quantity whose SI columns end with `suffix`; the usual ones first."""
-    usual = {"rad": ("deg", "rad"), "m": ("mm", "m"), "s": ("s", "ms", "us", "ns"), "degC": ("degC", "K", "degF")}
+    usual = {
+        "rad": ("deg", "rad"),
+        "m": ("mm", "m"),
+        "s": ("s", "ms", "us", "ns"),
+        "degC": ("degC", "K", "degF"),
+        "nm": ("Nm",),
+    }
     usual[AMBIGUOUS] = ("deg", "gon")
     return usual.get(suffix, tuple(_FACTORS.get(suffix, ())))
 
@@ -91,6 +105,8 @@ def split_heading(heading: str) -> tuple[str, str]:
     """
     if match := _BRACKETED.fullmatch(heading):
         return match[1].strip(), "" if match[2].strip() in _PLAIN_NUMBER else match[2].strip()
+    if match := _TORQUE.fullmatch(heading):
+        return match[1], "Nm"
     for form in (_IN_PARENTHESES, _BEHIND_IN, _BEHIND_SPACE, _BEHIND_STROKE, _SUFFIXED):
         match = form.fullmatch(heading)
         if match and match[1].strip() and unit_of(match[2]):

@@ -19,7 +19,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.recording.errors import RecordingError, SamplesError, shown
-from acquisition.recording.files.explain import spelt
 from acquisition.recording.foreign.column_meanings import CAMERA, POSE_MATRIX, TIME, UNUSED, Group, clauses, name_of
 from acquisition.recording.foreign.conversion import (
     EPOCH_S,
@@ -31,7 +30,7 @@ from acquisition.recording.foreign.conversion import (
     times_of,
     understand,
 )
-from acquisition.recording.foreign.heading_units import unit_of
+from acquisition.recording.foreign.heading_units import si_symbol, unit_of
 from acquisition.recording.foreign.sheet import Raw, Sheet, read_sheet
 from acquisition.recording.mcap.scan import check_batches
 from acquisition.recording.recording import Channel, Recording, Stream, check_declaration
@@ -53,7 +52,10 @@ _JOINT_CHANNELS: Mapping[str, str] = {
     "cmd": "target_q_rad",
     "enc": "position_rad",
     "qd": "actual_qd_rad_s",
+    "tau": "joint_torque_nm",
+    "motor_tau": "motor_torque_nm",
 }
+_UNITS: Mapping[str, str] = {"qd": "rad/s", "tau": "Nm", "motor_tau": "Nm"}  # else rad
 _NUMBERED = re.compile(r".*?(\d+)\D*")
 DEVICE_S = "device_s"
 OBJECT_BYTES, MESSAGE_BYTES = 400_000_000, 1500  # of all messages of a bag in memory, of a short one
@@ -213,8 +215,10 @@ def _channels(table: Understanding, group: Group) -> Iterator[tuple[Channel, NDA
     values = converted(table, group)
     prefix = "camera_" if group.meaning.startswith(CAMERA) else ""
     if group.meaning in _JOINT_CHANNELS:
-        unit = "rad/s" if group.meaning == "qd" else "rad"
-        yield Channel(_JOINT_CHANNELS[group.meaning], unit, values.shape[1:]), values
+        if group.joints:
+            some, values = values, np.full((len(values), table.rig.n_joints), np.nan)
+            values[:, np.array(group.joints) - 1] = some
+        yield Channel(_JOINT_CHANNELS[group.meaning], _UNITS.get(group.meaning, "rad"), values.shape[1:]), values
     elif group.meaning.endswith(("position", POSE_MATRIX)):
         yield Channel(f"{prefix}position_m", "m", (3,)), values[:, :3]
         if values.shape[1] == 6:
@@ -222,7 +226,7 @@ def _channels(table: Understanding, group: Group) -> Iterator[tuple[Channel, NDA
     elif values.shape[1] == 3:
         yield Channel(f"{prefix}rotation_rad", "rad", (3,)), values
     else:
-        unit = "°C" if group.suffix == "degC" else spelt(group.suffix) if group.suffix else group.unit
+        unit = si_symbol(group.suffix) or group.unit
         for name, column in zip(group.targets(table.rig.n_joints), values.T, strict=True):
             yield Channel(name, unit), column
 

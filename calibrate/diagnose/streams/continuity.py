@@ -93,7 +93,8 @@ def _frozen(track: Track, moving: Track | None) -> list[Break]:
         least = 0.0 if seen is None or not long else _least(values, seen)
         for first, last in long:
             # Its neighbours in time may belong to the motion before and after: clocks are known to a part of a sample.
-            if _moved(seen[first + 1 : last], least) if seen is not None else _too_long(equal, first, last):
+            moved = _moved(seen[first + 1 : last], least) if seen is not None else _too_long(equal, first, last)
+            if moved and not (seen is not None and _goes_on(values, first, last)):
                 found.setdefault((first, last), []).append(c)
     return [
         Break(
@@ -125,6 +126,18 @@ def _moved(meanwhile: Floats, least: float) -> bool:
     """Whether another device saw this channel move."""
     seen = meanwhile[np.isfinite(meanwhile)]
     return len(seen) > 0 and bool(np.isfinite(least)) and float(np.ptp(seen)) > limits.MOVED_MEANWHILE * least
+
+
+def _goes_on(values: Floats, first: int, last: int) -> bool:
+    """Whether a reading leaves its run by a step like those before and after: a joint that stuck while its set-point
+    crept on. One that was frozen jumps to where the motion has come meanwhile.
+    """
+    steps = np.abs(np.diff(values))
+    after = float(steps[last]) if last < len(steps) else 0.0
+    near = np.concatenate(
+        [steps[max(0, first - limits.FEWEST_EQUAL) : first], steps[last + 1 : last + 1 + limits.FEWEST_EQUAL]]
+    )
+    return after <= limits.GOES_ON_STEPS * float(np.max(near, initial=0.0))
 
 
 def _too_long(equal: Bools, first: int, last: int) -> bool:

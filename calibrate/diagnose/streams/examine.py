@@ -11,6 +11,7 @@ from calibrate.diagnose.streams.clock import ClockFit, ClockStatus, clock_betwee
 from calibrate.diagnose.streams.clock_faults import judged, lateness, shares_host_clock
 from calibrate.diagnose.streams.coarse_clock import Ticks
 from calibrate.diagnose.streams.continuity import Fault, breaks
+from calibrate.diagnose.streams.deflection import Deflection, deflections
 from calibrate.diagnose.streams.following import Following, following
 from calibrate.diagnose.streams.recorded import StreamDevice, by_host, start_between
 from calibrate.diagnose.streams.ringing import Levers, ringing
@@ -19,6 +20,7 @@ from calibrate.diagnose.streams.slips import Causes, slips
 from calibrate.diagnose.streams.stream_findings import (
     StreamFinding,
     break_findings,
+    deflection_finding,
     following_finding,
     late_finding,
     reading_lag_finding,
@@ -27,6 +29,7 @@ from calibrate.diagnose.streams.stream_findings import (
     unsettled_finding,
 )
 from calibrate.diagnose.streams.track import SIGMA_OF_MEDIAN, Outcome, Track
+from calibrate.model.effects.term import with_sigma
 
 Floats = NDArray[np.float64]
 Predicted = Callable[[Floats, Floats], Floats]  # (row, joint) rad and (row,) joints' clock -> (row, 4) spots, NaN: none
@@ -63,11 +66,12 @@ def examine(
     stands = stands_of((command or joints).track)
     clocks: dict[str, ClockFit] = {}
     behind: tuple[Following, ...] = ()
+    bent: tuple[Deflection, ...] = ()
     if command is not None:
         behind = following(command.track, joints.track)
         found += [following_finding(one) for one in behind if one.outcome is Outcome.FOUND]
     if "encoders" in devices:
-        clocks["encoders"], more = _encoders(joints, devices["encoders"], stands, causes)
+        clocks["encoders"], more, bent = _encoders(joints, devices["encoders"], stands, causes, devices.get("torque"))
         found += more
     if "spots" in devices:
         seen = _spots(joints, devices["spots"], stands, predicted)
@@ -79,7 +83,7 @@ def examine(
         if late is not None and late.counts:
             found.append(late_finding(name, late, joints.track.channels))
     found += _rings(joints.track, stands)
-    return StreamReport(tuple(found), clocks, behind, stands, tuple(_unseen(devices, clocks, behind, windows)))
+    return StreamReport(tuple(found), clocks, behind, stands, tuple(_unseen(devices, clocks, behind, windows, bent)))
 
 
 def _unseen(
@@ -87,6 +91,7 @@ def _unseen(
     clocks: Mapping[str, ClockFit],
     behind: Sequence[Following],
     windows: Sequence[Window] | None,
+    bent: Sequence[Deflection],
 ) -> Iterator[str]:
     for name, fit in clocks.items():
         if fit.offset_s is None:
@@ -95,6 +100,12 @@ def _unseen(
         yield "clock of spots: no fitted model predicts them during the motion"
     if "spots" in devices and windows is None:
         yield "samples taken unsettled: the recording has no averaging times of the samples"
+    for one in bent:
+        if one.outcome is Outcome.NOT_DETERMINABLE:
+            yield f"compliance of joint {one.joint}: the motion is too short, or too even"
+        elif one.outcome is Outcome.ABSENT and one.compliance is not None and one.sigma is not None:
+            size = with_sigma(1e6 * one.compliance, 1e6 * one.sigma)
+            yield f"compliance of joint {one.joint}: {size} µrad/Nm is within what this motion leaves open"
     yield from (f"following error of joint {f.joint}: it hardly moves" for f in behind if f.behind_s is None)
 
 
@@ -114,32 +125,41 @@ def _mended(devices: Mapping[str, StreamDevice]) -> tuple[list[StreamFinding], d
 
 
 def _encoders(
-    joints: StreamDevice, encoders: StreamDevice, stands: tuple[Stand, ...], causes: Causes | None
-) -> tuple[ClockFit, list[StreamFinding]]:
+    joints: StreamDevice,
+    encoders: StreamDevice,
+    stands: tuple[Stand, ...],
+    causes: Causes | None,
+    torque: StreamDevice | None,
+) -> tuple[ClockFit, list[StreamFinding], tuple[Deflection, ...]]:
+    if encoders.track.joints:  # `causes` ask for the angles of all joints
+        joints, causes = replace(joints, track=joints.track.of([j - 1 for j in encoders.track.joints])), None
     fit = clock_between(joints.track, encoders.track, start_between(joints, encoders))
     if fit.offset_s is None:
-        return _by_stamps(joints, encoders, stands, causes) if shares_host_clock(encoders) else (fit, [])
+        return (*_by_stamps(joints, encoders, stands, causes), ()) if shares_host_clock(encoders) else (fit, [], ())
     lags = following(joints.track, _moved(encoders.track, fit))
     alike = _alike(lags)
     if len(alike) >= limits.LAGGING_TOGETHER and any(one.outcome is Outcome.FOUND for one in lags):
         # one late joint pulls the common clock: what most joints share is the clock, the rest is that joint's own
-        again = clock_between(_of(joints.track, alike), _of(encoders.track, alike), start_between(joints, encoders))
+        again = clock_between(joints.track.of(alike), encoders.track.of(alike), start_between(joints, encoders))
         fit = fit if again.offset_s is None else again
         lags = following(joints.track, _moved(encoders.track, fit))
     at_joints = _moved(encoders.track, fit)
-    found = [reading_lag_finding(one) for one in lags if one.outcome is Outcome.FOUND]
+    bent = () if torque is None else deflections(at_joints, joints.track, _on_clock_of(joints, torque))
+    friction = {one.joint for one in bent if one.friction_may_lag}
+    found = [reading_lag_finding(one) for one in lags if one.outcome is Outcome.FOUND and one.joint not in friction]
+    found += [deflection_finding(one) for one in bent if one.outcome is Outcome.FOUND]
     found += [slip_finding(one) for one in slips(at_joints, joints.track, stands, causes).found]
     frozen = [one for one in breaks(at_joints, None, _behind(joints.track, lags)) if one.fault is Fault.FROZEN]
-    return fit, found + break_findings(at_joints, frozen) + _rings(at_joints, stands)
+    return fit, found + break_findings(at_joints, frozen) + _rings(at_joints, stands), bent
 
 
 def _behind(track: Track, lags: Sequence[Following]) -> Track:
     """As late in each channel as its reading: what has not moved yet is not frozen."""
     values = track.values.copy()
-    for one in lags:
+    for channel, one in enumerate(lags):
         if one.outcome is Outcome.FOUND and one.behind_s is not None:
-            later = track.curve.at(track.time_s - one.behind_s)[:, one.joint - 1]
-            values[:, one.joint - 1] = np.where(np.isfinite(later), later, values[:, one.joint - 1])
+            later = track.curve.at(track.time_s - one.behind_s)[:, channel]
+            values[:, channel] = np.where(np.isfinite(later), later, values[:, channel])
     return replace(track, values=values)
 
 
@@ -161,16 +181,12 @@ def _by_stamps(
 
 def _alike(lags: Sequence[Following]) -> list[int]:
     """Channels as late as most of those that moved."""
-    behind = {one.joint - 1: one.behind_s for one in lags if one.behind_s is not None}
+    behind = {channel: one.behind_s for channel, one in enumerate(lags) if one.behind_s is not None}
     if not behind:
         return []
     usual = float(np.median(list(behind.values())))
     scatter = SIGMA_OF_MEDIAN * float(np.median([abs(b - usual) for b in behind.values()]))
     return [c for c, b in behind.items() if abs(b - usual) <= max(3.0 * scatter, limits.BEHIND_S)]
-
-
-def _of(track: Track, channels: list[int]) -> Track:
-    return replace(track, values=track.values[:, channels])
 
 
 @dataclass(frozen=True, eq=False)
@@ -225,6 +241,13 @@ def levers_of(joints: Track, predicted: Predicted) -> Levers:
     return levers
 
 
+def _on_clock_of(joints: StreamDevice, other: StreamDevice) -> Track:
+    """As it stands where both were stamped together, else by the host's stamps."""
+    if np.array_equal(joints.track.time_s, other.track.time_s):
+        return other.track
+    return replace(other.track, time_s=by_host(other.track.time_s, other, joints))
+
+
 def _moved(track: Track, fit: ClockFit) -> Track:
     return replace(track, time_s=fit.to_reference(track.time_s))
 
@@ -232,4 +255,8 @@ def _moved(track: Track, fit: ClockFit) -> Track:
 def _rings(track: Track, stands: tuple[Stand, ...]) -> list[StreamFinding]:
     """Of angles: every joint turns its own reading only."""
     rings = ringing(track, stands, lambda _: np.eye(track.channels), limits.SERVO_S)
-    return [ringing_finding(track, rings)] if rings.stops else []
+    if not rings.stops:
+        return []
+    joint = None if rings.joint is None else track.joint(rings.joint - 1)
+    rivals = tuple(track.joint(one - 1) for one in rings.rivals)
+    return [ringing_finding(track, replace(rings, joint=joint, rivals=rivals))]

@@ -52,7 +52,7 @@ def following(command: Track, reading: Track) -> tuple[Following, ...]:
     good = np.all(np.isfinite(at) & np.isfinite(v) & np.isfinite(a), axis=1)
     block = np.floor((reading.time_s - reading.time_s[:1].sum()) / limits.BLOCK_S).astype(np.intp)
     return tuple(
-        _joint(j + 1, (at - reading.values)[good, j], v[good, j], a[good, j], block[good])
+        _joint(reading.joint(j), (at - reading.values)[good, j], v[good, j], a[good, j], block[good])
         for j in range(reading.channels)
     )
 

@@ -45,6 +45,7 @@ CLOCK_STEP_PERIODS = 2.5
 FEWEST_EQUAL = 5  # equal readings in a row that are looked at
 # steps of its own resolution, or sigmas of another device's noise, by which that one moved meanwhile
 MOVED_MEANWHILE = 10.0
+GOES_ON_STEPS = 1.5  # largest step near a run of equal readings; a joint that stuck leaves it by no more
 GAP_PERIODS = 5.0  # sampling periods; a longer pause is not bridged by a curve, since an arm can do anything meanwhile
 DARK = 0.2  # share of the usual light; a beam half off a face falls from full to nothing within its own width
 PRINTED_ROWS = 8  # rows that are printed one by one
@@ -63,6 +64,10 @@ RINGING_JOINTS_TIED = 0.05  # share of the swing; joints within it are not separ
 FEWEST_CYCLES = 1.5  # cycles in the window; fewer are a bend, not an oscillation
 MOST_DAMPING = 0.5  # damping ratio; beyond, it hardly swings, and is settling
 FINEST_SWING = 2.5  # samples of one swing, at least
+
+# What a measured torque does between two encoders
+DEFLECTION_ALPHA = 1e-2  # probability, over all joints; of one that turns under its torque, as unseen blocks do, too
+USUAL_DISC_RAD = 3e-4  # rad; eccentricity of a disc, one sigma: 6 µm on a radius of 20 mm
 
 # Slips of an encoder
 SLIP_SPARE_STANDS = 5  # stands beyond the numbers that are fitted

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -17,6 +17,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 COMMAND, JOINTS, ENCODERS, CURRENTS = "target_q_rad", "actual_q_rad", "position_rad", "photocurrent_a"
+JOINT_TORQUE, MOTOR_TORQUE = "joint_torque_nm", "motor_torque_nm"
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,12 +30,13 @@ class StreamDevice:
 
 
 def devices_of(recording: Recording) -> Mapping[str, StreamDevice]:
-    """Those that the recording has of "command", "joints", "encoders", "spots"."""
+    """Those that the recording has of "command", "joints", "encoders", "spots", "torque"."""
     found = {
         "command": _of(recording, COMMAND, "command"),
         "joints": _of(recording, JOINTS, "joints"),
-        "encoders": _of(recording, ENCODERS, "encoders"),
+        "encoders": _of_some_joints(_of(recording, ENCODERS, "encoders")),
         "spots": _spots(recording),
+        "torque": _torque(recording),
     }
     return {name: device for name, device in found.items() if device is not None}
 
@@ -73,6 +75,27 @@ def _of(recording: Recording, channel: str, name: str) -> StreamDevice | None:
     values = np.asarray(stream.values[channel], dtype=float)
     values = values.reshape(len(values), math.prod(values.shape[1:]))  # also of a stream without a sample
     return StreamDevice(Track(name, "rad", stream.device_s, values), stream.sequence, stream.host_s)
+
+
+def _of_some_joints(device: StreamDevice | None) -> StreamDevice | None:
+    """Without the channels of joints that have no reading at all."""
+    if device is None:
+        return None
+    there = np.flatnonzero(np.any(np.isfinite(device.track.values), axis=0))
+    if len(there) in (0, device.track.channels):
+        return device
+    return replace(device, track=device.track.of(there.tolist()))
+
+
+def _torque(recording: Recording) -> StreamDevice | None:
+    """In Nm at the joint. Of motors by the gear ratios of the rig file; a joint that has none is left out."""
+    device = _of(recording, JOINT_TORQUE, "torque")
+    if device is None and (device := _of(recording, MOTOR_TORQUE, "torque")) is not None:
+        arm = recording.rig.arm
+        ratios = [joint.gear_ratio or np.nan for joint in arm.joints]
+        device = replace(device, track=replace(device.track, values=device.track.values * np.array(ratios)))
+    device = _of_some_joints(device)
+    return None if device is None else replace(device, track=replace(device.track, unit="Nm"))
 
 
 def _spots(recording: Recording) -> StreamDevice | None:

@@ -12,7 +12,7 @@ nothing depends on which of the two encoders sits where.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -65,14 +65,14 @@ def slips(track: Track, other: Track, stands: Sequence[Stand], causes: Causes | 
     `causes`: what else may turn a joint between the two, at any pose; None: unknown.
     """
     track = track.read()
-    difference = Track("difference", track.unit, track.time_s, track.values - other.curve.at(track.time_s)).read()
+    difference = replace(track, name="difference", values=track.values - other.curve.at(track.time_s)).read()
     at = other.curve
     found: list[Slip] = []
     judged: list[bool] = []
     for j in range(track.channels):
         pieces = _pieces(difference, at, stands, j)
         innocent = _innocent(j, pieces, causes)
-        one = _of_joint(j + 1, pieces[:, :4], track.channels, innocent)
+        one = _of_joint(track.joint(j), pieces[:, :4], track.channels, innocent)
         judged.append(one is not None)
         found += one or []
     return Slips(tuple(sorted(found, key=lambda slip: slip.from_s)), tuple(judged))
@@ -84,9 +84,9 @@ def _pieces(difference: Track, at: TrackCurve, stands: Sequence[Stand], j: int) 
     A stand with a jump in it gives two.
     """
     out: list[Floats] = []
-    side = 0.0
+    side, joint = 0.0, difference.joint(j) - 1
     for stand in stands:
-        side = float(np.sign(stand.moved[j])) if abs(stand.moved[j]) > MOVED_RAD else side
+        side = float(np.sign(stand.moved[joint])) if abs(stand.moved[joint]) > MOVED_RAD else side
         rows = difference.between(stand.from_s + limits.SLIP_EDGE_S, stand.to_s)
         if len(rows.time_s) < 4:
             continue

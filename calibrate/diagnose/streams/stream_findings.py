@@ -9,6 +9,7 @@ from calibrate.diagnose.assess.diagnosis import Named
 from calibrate.diagnose.streams import limits
 from calibrate.diagnose.streams.clock_faults import Late
 from calibrate.diagnose.streams.continuity import Break, Fault
+from calibrate.diagnose.streams.deflection import Deflection
 from calibrate.diagnose.streams.following import Following
 from calibrate.diagnose.streams.ringing import Ringing
 from calibrate.diagnose.streams.settling import Unsettled, Window
@@ -48,8 +49,8 @@ def break_findings(track: Track, faults: Sequence[Break]) -> list[StreamFinding]
     for one in faults:
         where, of = "time", ""
         if one.fault is Fault.FROZEN and track.name in ("joints", "encoders") and one.channels:
-            where = f"joint{one.channels[0] + 1}.angle"
-            of = " at joint " + ", ".join(str(c + 1) for c in one.channels)
+            where = f"joint{track.joint(one.channels[0])}.angle"
+            of = " at joint " + ", ".join(str(track.joint(c)) for c in one.channels)
         kinds.setdefault((one.fault, where, of), []).append(one)
     return [_break_finding(track, *kind, alike) for kind, alike in kinds.items()]
 
@@ -127,6 +128,24 @@ def reading_lag_finding(one: Following) -> StreamFinding:
     way = "later" if (one.behind_s or 0.0) >= 0.0 else "earlier"
     says = f"the encoder of joint {one.joint} reads {_ms(one)} ms {way} than those of the other joints{kind}"
     return StreamFinding(name, "encoders", Outcome.FOUND, _behind(one), None, None, max(one.p, CERTAIN), says)
+
+
+def deflection_finding(one: Deflection) -> StreamFinding:
+    """ValueError where nothing was found."""
+    if one.compliance is None or one.sigma is None:
+        raise ValueError(f"joint {one.joint}: no deflection ({one.outcome.value})")
+    name = Named(f"joint{one.joint}.angle", (f"tau{one.joint}",), "linear", None, "joint-compliance")
+    stiffness = 1.0 / one.compliance
+    sizes = {
+        "compliance_rad_per_nm": Size(one.compliance, one.sigma),
+        "stiffness_nm_per_rad": Size(stiffness, one.sigma * stiffness**2),
+    }
+    says = (
+        f"the two encoders of joint {one.joint} part by {with_sigma(1e6 * one.compliance, 1e6 * one.sigma)} µrad a Nm: "
+        f"stiffness {1e-6 * stiffness:.3g} ± {1e-6 * one.sigma * stiffness**2:.2g} Nm/µrad; unseen seconds are missed "
+        f"by {1e6 * one.unseen_after_rad:.0f} in place of {1e6 * one.unseen_before_rad:.0f} µrad"
+    )
+    return StreamFinding(name, "encoders", Outcome.FOUND, sizes, None, None, max(one.p, CERTAIN), says)
 
 
 def slip_finding(one: Slip) -> StreamFinding:

@@ -1,6 +1,6 @@
 """One quantity of one device over that device's own clock: what the finders of streams examine."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
 from functools import cached_property
@@ -36,6 +36,7 @@ class Track:
     unit: str
     time_s: Floats
     values: Floats
+    joints: tuple[int, ...] = ()  # of the channels, from 1, where there is not one of every joint in order
 
     def __post_init__(self) -> None:
         if self.values.ndim != 2 or self.time_s.shape != self.values.shape[:1]:
@@ -51,6 +52,15 @@ class Track:
     @property
     def channels(self) -> int:
         return self.values.shape[1]
+
+    def joint(self, channel: int) -> int:
+        """Number, from 1, of the joint of a channel, from 0."""
+        return self.joints[channel] if self.joints else channel + 1
+
+    def of(self, channels: Sequence[int]) -> "Track":
+        """These channels alone."""
+        some = [*channels]
+        return replace(self, values=self.values[:, some], joints=tuple(map(self.joint, some)))
 
     def read(self) -> "Track":
         """Without samples in which a channel was not read, in rising time; later stamps of one time are left out."""

@@ -77,6 +77,19 @@ def test_a_standing_reading_is_not_frozen():
     assert not breaks(coarse)
 
 
+@pytest.mark.parametrize(("catches_up", "frozen"), [(True, 1), (False, 0)])
+def test_a_joint_that_sticks_while_its_set_point_creeps_on_is_not_frozen(catches_up, frozen):
+    """A frozen reading jumps to where the motion has come; a joint that stuck goes on from where it stood."""
+    t = np.arange(1000) * 4e-3
+    command = np.round(0.1 * np.sin(t), 6)[:, None]
+    reading = command.copy()
+    reading[300:320] = reading[300]
+    if not catches_up:
+        reading[320:] += reading[300] - command[319]
+    found = breaks(Track("joints", "rad", t, reading), None, Track("command", "rad", t, command))
+    assert len([b for b in found if b.fault is Fault.FROZEN]) == frozen
+
+
 def test_noise_that_stops_is_a_frozen_reading():
     rng = np.random.default_rng(1)
     values = np.round(rng.normal(0.0, 1e-6, (1000, 2)), 9)
