@@ -123,5 +123,6 @@ def _places(rig: Rig, poses: int, most: int, rng: np.random.Generator, progress:
     wide = with_grid(rig)
     offered = candidates_of(wide, PER_GRID_PLACE, rng, lambda done, total: progress("places", done, total))
     found = information_of(wide, offered, rng)
-    sigma_m = min((d.sigma_m for d in rig.known_distances), default=DISTANCE_SIGMA_M)
+    stated_m = (d.sigma_m for d in rig.known_distances if d.of == "placement")
+    sigma_m = min(stated_m, default=DISTANCE_SIGMA_M)
     return choose_places(found, offered, wide.placement_list, poses, sigma_m, most)

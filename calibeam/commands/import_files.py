@@ -5,7 +5,7 @@ import tempfile
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 from cyclopts import Parameter, validators
 from rich.table import Table
@@ -25,6 +25,7 @@ from acquisition.recording.foreign import (
     columns_file,
     questions,
     read_log,
+    read_seats,
     read_sheet,
     recording_of,
     samples_of,
@@ -55,7 +56,8 @@ def import_command(
     rig: Path | None = None,
     columns: str = "",
     sheet: str | None = None,
-    header_row: Annotated[int, Parameter(validator=validators.Number(gte=1))] | None = None,
+    header_row: Annotated[int, Parameter(validator=validators.Number(gte=0))] | None = None,
+    seat_from: Literal["file"] | None = None,
     streams: bool = False,
     yes: bool = False,
 ) -> None:
@@ -72,6 +74,7 @@ def import_command(
     calibeam import session --out session.mcap
     calibeam import bus.blf --rig rigs/ur5e-dual-psd.toml --out bus.mcap
     calibeam import robot.csv encoders.csv --streams --rig rig.toml --out streams.mcap
+    calibeam import */hole_?.csv --seat-from file --header-row 0 --columns "1..7 [rad] = q" --rig rig.toml --out session
     ```
 
     Parameters
@@ -80,7 +83,7 @@ def import_command(
         A table; a session folder, with its folder "streams" if it has one; a ROS 2 bag; or a CAN log: .blf, .asc, .csv
         or .log (candump).
     others
-        Further logs of the same time, with --streams.
+        Further logs of the same time, with --streams; further seats, with --seat-from.
     out
         The session folder or recording to make.
     rig
@@ -92,7 +95,11 @@ def import_command(
     sheet
         The sheet of a workbook with several tables.
     header_row
-        The row of the headings, from 1, where what stands above them is taken for headings.
+        The row of the headings, from 1, where what stands above them is taken for headings; 0: there are none, the
+        columns are named 1, 2, ...
+    seat_from
+        `file`: each table holds the postures of one seat (a ball in a socket). Seats are numbered from 1 in the order
+        of the files, of a folder by name; the name of a seat is its folder and file: front_left/hole_0.
     streams
         A row of a table is a moment, not a pose: make a recording of streams.
     yes
@@ -101,7 +108,7 @@ def import_command(
     """
     if source.name in (CSV, PARQUET) and rig is None and (source.parent / RIG).is_file():
         source = source.parent
-    if source.is_dir() and not (source / BAG).is_file():
+    if seat_from is None and source.is_dir() and not (source / BAG).is_file():
         if others:
             raise RecordingError(f"{others[0]}: a session folder is imported by itself; leave the others out")
         given = {"rig": rig, "columns": columns, "sheet": sheet, "header_row": header_row, "streams": streams}
@@ -112,11 +119,16 @@ def import_command(
         return
     for path in (source, *others):
         _check_known(path)
+    if seat_from is not None:
+        _refuse(source, "the postures in a seat have no time", streams=streams)
     if sheet is not None and not any(path.suffix.lower() in WORKBOOKS for path in (source, *others)):
         raise RecordingError(f"{source}: --sheet {sheet}: only a workbook has sheets; leave --sheet out")
     if rig is None:
         raise RecordingError(f"{source}: a table or a log names no rig; give --rig RIG.toml")
-    if _is_can(source) and not others:
+    if seat_from is not None:
+        seats = read_seats((source, *others), sheet, header_row)
+        _table(understand(seats, rig_text(rig), str(rig), columns), out, yes=yes)
+    elif _is_can(source) and not others:
         _refuse(
             source, "a CAN log has no columns", columns=columns, sheet=sheet, header_row=header_row, streams=streams
         )
@@ -125,7 +137,10 @@ def import_command(
         sheets = [table for path in (source, *others) for table in _log_tables(path, (sheet, header_row), rig, out)]
         _logs(understand_logs(sheets, rig_text(rig), str(rig), columns), out, yes=yes)
     elif others:
-        raise RecordingError(f"{others[0]}: one table becomes one session; give --streams for several logs of one time")
+        raise RecordingError(
+            f"{others[0]}: one table becomes one session; give --streams for several logs of one time, or "
+            "--seat-from file for one table a seat"
+        )
     else:
         _table(understand(read_sheet(source, sheet, header_row), rig_text(rig), str(rig), columns), out, yes=yes)
 
@@ -294,5 +309,5 @@ def _is_can_csv(source: Path) -> bool:
 
 def _refuse(source: Path, why: str, **given: object) -> None:
     for name, value in ((name.replace("_", "-"), value) for name, value in given.items()):
-        if value not in (None, "", False):
+        if value is not None and value is not False and value != "":
             raise RecordingError(f"{source}: --{name} {value}: {why}; leave --{name} out")

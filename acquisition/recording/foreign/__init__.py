@@ -1,9 +1,10 @@
 """Tables and logs of other programs: read as they stand, understood, brought to SI, and made a session or streams.
 
 `read_sheet` reads xlsx, CSV and Parquet; `understand` finds what the columns mean for a rig; `questions` are the units
-that nobody has stated; `samples_of` and `write_session` make a session folder. `read_log`, `understand_logs` and
-`recording_of` do the same for logs and ROS 2 bags, which become streams. A new name of a column is a word in
-`column_meanings`, a new way to write an orientation a function in `rotations`, a new unit a line in `heading_units`.
+that nobody has stated; `samples_of` and `write_session` make a session folder; `read_seats` joins one table a seat.
+`read_log`, `understand_logs` and `recording_of` do the same for logs and ROS 2 bags, which become streams. A new name
+of a column is a word in `column_meanings`, a new way to write an orientation a function in `rotations`, a new unit a
+line in `heading_units`.
 """
 
 from acquisition.recording.foreign.conversion import (
@@ -17,7 +18,7 @@ from acquisition.recording.foreign.conversion import (
     write_session,
 )
 from acquisition.recording.foreign.logs import BAG_SUFFIXES, read_log, recording_of, understand_logs
-from acquisition.recording.foreign.sheet import SUFFIXES, Sheet, read_sheet
+from acquisition.recording.foreign.sheet import SUFFIXES, Sheet, read_seats, read_sheet
 
 __all__ = [
     "BAG_SUFFIXES",
@@ -28,6 +29,7 @@ __all__ = [
     "columns_file",
     "questions",
     "read_log",
+    "read_seats",
     "read_sheet",
     "recording_of",
     "samples_of",

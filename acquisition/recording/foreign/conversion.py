@@ -280,7 +280,7 @@ def columns_file(table: Understanding, samples: Samples | None, software: str) -
         "calibeam-columns",
         software,
         sheet.path.name,
-        hashlib.sha256(sheet.path.read_bytes()).hexdigest() if sheet.path.is_file() else "",
+        _sha256(sheet),
         sheet.name,
         len(sheet.rows),
         tuple(_record(table, group, samples) for group in used),
@@ -288,6 +288,15 @@ def columns_file(table: Understanding, samples: Samples | None, software: str) -
         tuple(_notes(table)),
         ", ".join(_clause(table, group) for group in used),
     )
+
+
+def _sha256(sheet: Sheet) -> str:
+    """Of the file, or of several one after the other; "" for a folder."""
+    whole = hashlib.sha256()
+    files = [file for file in dict.fromkeys(sheet.files) or (sheet.path,) if file.is_file()]
+    for file in files:
+        whole.update(file.read_bytes())
+    return whole.hexdigest() if files else ""
 
 
 def write_session(table: Understanding, samples: Samples, about: ColumnsFile, folder: Path) -> Path:
@@ -331,6 +340,10 @@ def _notes(table: Understanding) -> Iterator[str]:
     time_group = next((group for group in table.groups if group.meaning == TIME), None)
     if sheet.title:
         yield f"above the headings, not read: {shown('; '.join(sheet.title), 80)}"
+    for number, file in enumerate(dict.fromkeys(sheet.files), start=1):
+        count = sheet.files.count(file)
+        name = file.absolute().relative_to(sheet.path).with_suffix("").as_posix()
+        yield f"seat {number}: {name}, {count} row{'' if count == 1 else 's'}"
     if sheet.decimal == ",":
         yield "decimal comma"
     if time_group is None:

@@ -1,7 +1,8 @@
 """A table of another program as it stands in its file: xlsx, CSV of any dialect, or Parquet; nothing is converted yet.
 
 The heading row is the one with the most texts and no number, just above the numbers; rows above it are a title. A row
-of units may follow. Two rows that may be headings, with numbers between them, are refused.
+of units may follow. Without headings (`header_row` 0) the columns are named 1, 2, ... Two rows that may be headings,
+with numbers between them, are refused.
 Decimals are a point or a comma, decided once for the whole file and refused where both occur.
 """
 
@@ -12,7 +13,7 @@ import math
 import re
 import zipfile
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import date, datetime, time
 from functools import cached_property
 from pathlib import Path
@@ -21,7 +22,8 @@ from typing import Any
 from acquisition.recording.errors import SamplesError, shown
 from acquisition.recording.files.bounds import UNPACKED_BYTES
 from acquisition.recording.files.table_file import check_cells, parquet_table, table_bytes
-from acquisition.recording.foreign.heading_units import unit_of
+from acquisition.recording.foreign.heading_units import folded, unit_of
+from acquisition.recording.samples import SEAT
 
 SUFFIXES = (".xlsx", ".xlsm", ".csv", ".tsv", ".txt", ".parquet")
 SEPARATORS = (";", "\t", ",")  # in this order: a table with decimal commas has them inside its cells
@@ -55,13 +57,14 @@ class Sheet:
     title: tuple[str, ...] = ()  # what stands above the headings
     heading_line: int = 0  # in the file, from 1; 0: the file has names of columns apart from its rows
     decimal: str = "."  # or ",": of numbers that are text
+    files: tuple[Path, ...] = ()  # of each row, where they come from several files
 
     def place(self, row: int | None = None, column: int | None = None) -> str:
         """Where a cell is, for a person: file, sheet, row, column."""
         sheet = f" sheet '{shown(self.name, 40)}'" if self.name else ""
         line = "" if row is None else f" row {self.lines[row]}"
         heading = "" if column is None else f", column '{shown(self.headings[column], 40)}'"
-        return f"{self.path}{sheet}{line}{heading}"
+        return f"{self.files[row] if self.files and row is not None else self.path}{sheet}{line}{heading}"
 
     @property
     def titles(self) -> str:
@@ -129,7 +132,7 @@ class Sheet:
 
 
 def read_sheet(path: Path, sheet: str | None = None, header_row: int | None = None) -> Sheet:
-    """The table of a file; `sheet` names one of a workbook with several, `header_row` the row of headings, from 1.
+    """The table of a file; `sheet`: of a workbook with several, `header_row` the row of headings, from 1 (0: none).
 
     SamplesError naming file and place where it cannot be read or holds no table.
     """
@@ -145,6 +148,52 @@ def read_sheet(path: Path, sheet: str | None = None, header_row: int | None = No
     if header_row is not None:
         raise SamplesError(f"{path}: --header-row {header_row}: Parquet names its columns itself; leave it out")
     return _parquet(path)
+
+
+def read_seats(sources: Sequence[Path], sheet: str | None = None, header_row: int | None = None) -> Sheet:
+    """One table with a column `seat` of files that hold the postures in one seat each (a ball in a socket).
+
+    Seats are numbered from 1 in the order of the files; a folder means all tables in it and below, by name.
+
+    SamplesError naming the file that cannot be read, has other headings than the first, or names seats itself.
+    """
+    files = [file for source in sources for file in (_tables_in(source) if source.is_dir() else (source,))]
+    if twice := next((file for file in files if files.count(file) > 1), None):
+        raise SamplesError(f"{twice}: given twice; one file is one seat")
+    if len(files) < 2:
+        raise SamplesError(f"{sources[0]}: --seat-from file: 1 table; give one for each seat, or their folder")
+    tables = [read_sheet(file, sheet, header_row) for file in files]
+    first = tables[0]
+    if named := next((heading for heading in first.headings if folded(heading) == SEAT), None):
+        raise SamplesError(f"{first.path}: column '{named}' names the seats already; leave --seat-from out")
+    for table in tables:
+        for what in ("headings", "unit_row", "decimal"):
+            own, others = getattr(table, what), getattr(first, what)
+            if own != others and (table.rows or what == "headings"):
+                differ = f"{shown(str(own), 60)}, those of {first.path} are {shown(str(others), 60)}"
+                raise SamplesError(
+                    f"{table.path}: its {what.replace('_', ' ')}: {differ}; name only the files of seats, all written "
+                    "in one way"
+                )
+    return replace(
+        first,
+        path=_common(files),
+        headings=(*first.headings, SEAT),
+        unit_row=(*first.unit_row, ""),
+        rows=tuple((*row, number) for number, table in enumerate(tables, start=1) for row in table.rows),
+        lines=tuple(line for table in tables for line in table.lines),
+        files=tuple(file for file, table in zip(files, tables, strict=True) for _ in table.rows),
+    )
+
+
+def _tables_in(folder: Path) -> Sequence[Path]:
+    return sorted(path for path in folder.rglob("*") if path.suffix.lower() in SUFFIXES and path.is_file())
+
+
+def _common(files: Sequence[Path]) -> Path:
+    """The folder that all files are in or below."""
+    whole = [file.absolute() for file in files]
+    return next(folder for folder in whole[0].parents if all(file.is_relative_to(folder) for file in whole))
 
 
 def _text(path: Path, header_row: int | None) -> Sheet:
@@ -304,12 +353,14 @@ def _tabled(path: Path, name: str, rows: Sequence[tuple[int, Sequence[Raw]]], he
     where = f"{path} sheet '{shown(name, 40)}'" if name else str(path)
     if header_row is None:
         at = _heading_row(rows)
+    elif header_row == 0:
+        at, rows = 0, ((0, [str(i) for i in range(1, 1 + max((len(c) for _, c in rows), default=0))]), *rows)
     elif (at := next((i for i, (line, _) in enumerate(rows) if line == header_row), None)) is None:
         raise SamplesError(f"{where}: --header-row {header_row}: nothing stands there; give the row of the headings")
     if at is None:
         raise SamplesError(
             f"{where}: no row of headings with numbers below; write the columns' names above the numbers, or state "
-            "their row: --header-row"
+            "their row: --header-row, 0 where there is none"
         )
     if header_row is None:
         _refuse_two_headings(where, rows, at)

@@ -162,10 +162,10 @@ def _placement_faults(rig: Rig) -> Iterator[Fault]:
     for index, distance in enumerate(rig.known_distances):
         path = ("known_distance", index)
         for key, number in (("from", distance.from_placement), ("to", distance.to_placement)):
-            if number not in rig.placements:
+            if distance.of == "placement" and number not in rig.placements:
                 yield (*path, key), f"{key} = {number} is no placement of this rig (it has {known}); correct it"
         if distance.from_placement == distance.to_placement:
-            yield (*path, "to"), f"from and to are the same placement {distance.to_placement}; a distance needs two"
+            yield (*path, "to"), f"from and to are the same {distance.of} {distance.to_placement}; a distance needs two"
 
 
 def _twice(table: KeyPath, ids: tuple[int, ...]) -> Iterator[Fault]:

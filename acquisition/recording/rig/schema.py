@@ -162,12 +162,13 @@ class Placement(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class KnownDistance(Struct, frozen=True, forbid_unknown_fields=True):
-    """A measured distance between the PSD 1 centres of two placements: the source of scale."""
+    """A known distance: between the PSD 1 centres of two placements, or two seats of unknown place. Source of scale."""
 
     from_placement: Identity = field(name="from")
     to_placement: Identity = field(name="to")
     length_m: RoomSize
     sigma_m: SigmaMetres
+    of: Literal["placement", "seat"] = "placement"
 
 
 class Bar(Struct, frozen=True, forbid_unknown_fields=True):

@@ -109,6 +109,7 @@ def result_of(
             minus_2_log_likelihood(fitted.problem, fitted.fit.theta),
         ),
         f"calibeam {version('calibeam')}",
+        sum(block.rows for block in fitted.weighting.known),
     )
 
 

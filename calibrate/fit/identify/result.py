@@ -146,6 +146,7 @@ class Identification:
     n_samples: int  # rows that took part
     end: FitEnd
     software: str
+    known_lengths: int = 0  # that the rig states between points of the session
     point_constraints: PointConstraints | None = None  # the method beside the fit, where the plan asks for it
 
     @property
@@ -161,7 +162,9 @@ class Identification:
     @property
     def alarms(self) -> tuple[str, ...]:
         """Sentences about noise and model that a person must read before the numbers; none where all agrees."""
-        return alarms_of(self.stated_noise, self.repeats) + scale_alarms(i.name for i in self.instruments)
+        return alarms_of(self.stated_noise, self.repeats) + scale_alarms(
+            (i.name for i in self.instruments), self.known_lengths
+        )
 
 
 def alarms_of(stated: StatedNoise, repeats: RepeatNoise | None) -> tuple[str, ...]:
@@ -176,14 +179,15 @@ def alarms_of(stated: StatedNoise, repeats: RepeatNoise | None) -> tuple[str, ..
     return tuple(out)
 
 
-def scale_alarms(instruments: Iterable[str]) -> tuple[str, ...]:
-    """A sentence for a session of cones alone; none where any instrument measures a length.
+def scale_alarms(instruments: Iterable[str], known_lengths: int = 0) -> tuple[str, ...]:
+    """A sentence for a session of cones alone; none where any instrument measures a length, or one is known.
 
     A factor on all lengths of arm and seats leaves tip less seat at zero: a point-only fit cannot fix scale.
     """
-    if set(instruments) != SCALELESS:
+    if set(instruments) != SCALELESS or known_lengths:
         return ()
     return (
         "cones alone determine no length: the size of the arm stays nominal, and every length that it measures is "
-        "as uncertain as that; measure a bar of known length ([[bar]], columns bar and bar_end) as well",
+        "as uncertain as that; measure a bar of known length ([[bar]], columns bar and bar_end) as well, "
+        'or state the distance of two cones ([[known_distance]] of = "seat")',
     )

@@ -1,15 +1,16 @@
-"""Known distances between the PSD 1 centres of two placements: a ruler laid beside the session, the source of scale.
+"""Known distances between two points that a session shares: PSD 1 centres of placements, or seats. The source of scale.
 
-They speak of placement parameters only; no arm pose is involved. Their stated sigma is their weight.
+They speak of the parameters of these points only; no arm pose is involved. Their stated sigma is their weight.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from acquisition.recording.rig import Rig
 from calibrate.errors import DataError
-from calibrate.model.optics.dual_psd import DualPsd
 from calibrate.model.parameters import Parameter
 
 Floats = NDArray[np.float64]
@@ -17,21 +18,23 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class KnownDistances:
-    """Block (calibrate/fit/joint_problem.py) over the placements of a dual PSD."""
+    """Block (calibrate/fit/joint_problem.py) over points in the base.
 
-    sensor: DualPsd
-    between: NDArray[np.int64]  # (row, 2) placement ids
+    `parameters`: as many a point, point by point in the order of `start_m`; the first three shift it along its axes.
+    """
+
+    kind: str  # "placement", "seat"
+    parameters: tuple[Parameter, ...]
+    start_m: Mapping[int, Floats]  # point -> (3,) in the base
+    axes: Mapping[int, Floats]  # point -> (3, 3) the axes as columns, in the base
+    between: NDArray[np.int64]  # (row, 2) points
     length_m: Floats  # (row,)
     sigma_m: Floats  # (row,)
 
     def __post_init__(self) -> None:
-        unknown = set(self.between.ravel().tolist()) - set(self.sensor.places)
+        unknown = set(self.between.ravel().tolist()) - set(self.start_m)
         if unknown:
-            raise DataError(f"known distance: placement {min(unknown)} is not in the rig; add a [[placement]]")
-
-    @property
-    def parameters(self) -> tuple[Parameter, ...]:
-        return tuple(p for p in self.sensor.parameters if p.name.startswith("placement"))
+            raise DataError(f"known distance: {self.kind} {min(unknown)} is not in the rig; add a [[{self.kind}]]")
 
     @property
     def rows(self) -> int:
@@ -48,21 +51,35 @@ class KnownDistances:
     def jacobian(self, theta: Floats) -> Floats:
         span = self._span(theta)
         along = span / np.linalg.norm(span, axis=1, keepdims=True)
-        out = np.zeros((self.rows, len(self.sensor.places), 6))
-        for sign, places in zip((-1.0, 1.0), self.between.T, strict=True):
-            for row, place in enumerate(places.tolist()):
-                k = self.sensor.places.index(place)
-                out[row, k, :3] += sign * along[row] @ self.sensor.fixture.T_base_psd1[place][:3, :3]
-        return out.reshape(self.rows, 6 * len(self.sensor.places)) / self.sigma_m[:, None]
+        points = list(self.start_m)
+        out = np.zeros((self.rows, len(points), len(self.parameters) // len(points)))
+        for sign, ends in zip((-1.0, 1.0), self.between.T, strict=True):
+            for row, point in enumerate(ends.tolist()):
+                out[row, points.index(point), :3] += sign * along[row] @ self.axes[point]
+        return out.reshape(self.rows, len(self.parameters)) / self.sigma_m[:, None]
 
     def select(self, rows: NDArray[np.intp]) -> "KnownDistances":
         return replace(self, between=self.between[rows], length_m=self.length_m[rows], sigma_m=self.sigma_m[rows])
 
     def _span(self, theta: Floats) -> Floats:
-        """(row, 3) from one PSD 1 centre to the other, in the base."""
-        shift = theta.reshape(-1, 6)[:, :3]
-        centre = {
-            k: T[:3, 3] + T[:3, :3] @ shift[self.sensor.places.index(k)]
-            for k, T in self.sensor.fixture.T_base_psd1.items()
-        }
-        return np.array([centre[b] - centre[a] for a, b in self.between.tolist()]).reshape(-1, 3)
+        """(row, 3) from one point to the other, in the base."""
+        shifts = dict(zip(self.start_m, theta.reshape(len(self.start_m), -1)[:, :3], strict=True))
+        at = {k: start + self.axes[k] @ shifts[k] for k, start in self.start_m.items()}
+        return np.array([at[b] - at[a] for a, b in self.between.tolist()]).reshape(-1, 3)
+
+
+def distances_between(
+    kind: str,
+    rig: Rig,
+    used: set[int],
+    parameters: tuple[Parameter, ...],
+    start_m: Mapping[int, Floats],
+    axes: Mapping[int, Floats],
+) -> tuple[KnownDistances, ...]:
+    """One block, or none, of the stated distances of this kind between points that the session has used."""
+    listed = [d for d in rig.known_distances if d.of == kind and {d.from_placement, d.to_placement} <= used]
+    if not listed:
+        return ()
+    between = np.array([[d.from_placement, d.to_placement] for d in listed])
+    length_m, sigma_m = np.array([d.length_m for d in listed]), np.array([d.sigma_m for d in listed])
+    return (KnownDistances(kind, parameters, start_m, axes, between, length_m, sigma_m),)

@@ -27,7 +27,7 @@ from calibrate.model.checks.witness import (
 )
 from calibrate.model.parameters import Parameter
 from calibrate.model.placement import SharedPoints, Target, point_by_twist
-from calibrate.model.problem import Measured
+from calibrate.model.problem import Block, Measured
 from calibrate.model.sample_table import SampleTable
 from calibrate.model.sensors.kind import (
     Columns,
@@ -37,6 +37,7 @@ from calibrate.model.sensors.kind import (
     SensorKind,
     Trait,
 )
+from calibrate.model.sensors.known_distance import distances_between
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -168,6 +169,17 @@ def _build(table: SampleTable) -> Measured | None:
     return table.measured(KIND.name, chain, rows, np.zeros((len(rows), 3)), own, condition=True)
 
 
+def _known_distances(table: SampleTable) -> tuple[Block, ...]:
+    """Between seats with rows; between others they show nothing."""
+    rows = table.filled(SEAT)
+    if not table.rig.known_distances or len(rows) == 0:
+        return ()
+    points = mean_tips(table.tips_m[rows], table.samples.integers(SEAT, 0)[rows])
+    starts = {k: points.start_m[k] for k in points.numbers}
+    axes = dict.fromkeys(starts, np.eye(3))
+    return distances_between(POINTS, table.rig, set(starts), points.parameters, starts, axes)
+
+
 def _pivot_m(table: SampleTable) -> Floats | None:
     """(3,) the target by which every cone's tips meet."""
     rows = table.filled(SEAT)
@@ -214,6 +226,7 @@ KIND = SensorKind(
     reads=TIP,
     asks=(SEAT,),
     build=_build,
+    lengths=_known_distances,
     point_m=_pivot_m,
     witness=_witness,
     predict=predicted_tips,

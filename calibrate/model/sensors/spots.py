@@ -43,7 +43,7 @@ from calibrate.model.sensors.kind import (
     SensorKind,
     Trait,
 )
-from calibrate.model.sensors.known_distance import KnownDistances
+from calibrate.model.sensors.known_distance import distances_between
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -188,14 +188,12 @@ def _known_distances(table: SampleTable) -> tuple[Block, ...]:
     if len(table.filled(*SPOTS)) == 0:
         return ()
     seen = observations(table.samples, table.angles)
-    used = set(seen.placement.tolist())
-    listed = [d for d in table.rig.known_distances if {d.from_placement, d.to_placement} <= used]
-    if not listed:
-        return ()
     sensor = dual_psd_of(table.rig, seen.placement, seen.first_psd)
-    between = np.array([[d.from_placement, d.to_placement] for d in listed])
-    length_m, sigma_m = np.array([d.length_m for d in listed]), np.array([d.sigma_m for d in listed])
-    return (KnownDistances(sensor, between, length_m, sigma_m),)
+    frames = {k: sensor.fixture.T_base_psd1[k] for k in sensor.places}
+    places = tuple(p for p in sensor.parameters if p.name.startswith("placement"))
+    centres, axes = {k: T[:3, 3] for k, T in frames.items()}, {k: T[:3, :3] for k, T in frames.items()}
+    used = set(seen.placement.tolist())
+    return distances_between("placement", table.rig, used, places, centres, axes)
 
 
 def _witness(rig: Rig, samples: Samples, q_rad: Floats) -> Witness | None:

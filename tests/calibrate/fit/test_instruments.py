@@ -226,6 +226,20 @@ def test_known_distances_speak_of_used_placements_only(rig, sessions):
     assert found.weighting.problem(found.start).rows == 25
 
 
+def test_a_known_distance_of_two_cones_gives_the_scale(rig):
+    """Whatever the drawing: one that is 1 % longer wants an arm 1 % longer. Of a cone without rows none is used."""
+    q, seat = seated(rig, CONES, 40)
+    longer_m = 1.01 * float(np.linalg.norm(CONES[1] - CONES[0]))
+    stated = KnownDistance(1, 2, longer_m, 1e-6, "seat"), KnownDistance(1, 9, 1.0, 1e-6, "seat")
+    found = instruments_of(table(q, seat=seat.astype(float)), msgspec.structs.replace(rig, known_distances=stated))
+    (known,) = found.weighting.known
+    problem = found.weighting.problem(found.start)
+    assert (known.rows, problem.rows) == (1, len(q) + 1)
+    assert problem.residual(found.start)[-1] == pytest.approx(-0.01 * longer_m / 1.01 / 1e-6)
+    assert abs(problem.residual(found.start + 0.01 * scale(found, rig))[-1]) < 1e-6
+    assert seen_without_drawing(found).reason("link2.length") is None
+
+
 def test_sizes_of_joint_and_tracker_noise_are_both_found(rig, truth):
     q = random_readings(300)
     read = q + np.random.default_rng(10).normal(0, 3e-5, q.shape)

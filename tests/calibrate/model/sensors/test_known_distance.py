@@ -1,5 +1,7 @@
 """Known distances between placements: rows on placement parameters alone."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -18,7 +20,10 @@ def known():
     sensor = DualPsd(
         mount, Fixture(0.01, transform([0, 0.1, 0.1], [2.3, 0, 0]), places), np.array([2, 5]), np.array([1, 2])
     )
-    return KnownDistances(sensor, np.array([[2, 5], [5, 2]]), np.array([0.68, 0.67]), np.array([1e-5, 2e-5]))
+    parameters = tuple(p for p in sensor.parameters if p.name.startswith("placement"))
+    centres, axes = {k: T[:3, 3] for k, T in places.items()}, {k: T[:3, :3] for k, T in places.items()}
+    between, lengths_m, sigmas_m = np.array([[2, 5], [5, 2]]), np.array([0.68, 0.67]), np.array([1e-5, 2e-5])
+    return KnownDistances("placement", parameters, centres, axes, between, lengths_m, sigmas_m)
 
 
 def test_the_residual_is_in_sigmas_of_the_stated_length(known):
@@ -41,4 +46,4 @@ def test_a_selection_keeps_the_unknowns(known):
 
 def test_an_unknown_placement_is_refused(known):
     with pytest.raises(DataError, match="placement 9 is not in the rig"):
-        KnownDistances(known.sensor, np.array([[2, 9]]), np.ones(1), np.ones(1))
+        replace(known, between=np.array([[2, 9], [5, 2]]))
