@@ -143,7 +143,7 @@ def _is_can(path: Path) -> bool:
 
 def _can(source: Path, out: Path, rig: Path) -> None:
     """Every frame, and where the rig names a DBC file what the encoders sent."""
-    encoders = load_rig(rig).devices.encoders
+    encoders = load_rig(rig, needs_arm=False).devices.encoders
     if encoders is None or not described_by_dbc(encoders):
         with taken_back(out):
             done = import_can(source, out, rig_text=rig_text(rig), software=SOFTWARE)
@@ -178,7 +178,7 @@ def _log_tables(path: Path, place: tuple[str | None, int | None], rig: Path, out
     """`place`: sheet and row of the headings."""
     if not _is_can(path):
         return read_log(path, place[0] if path.suffix.lower() in WORKBOOKS else None, place[1])
-    encoders = load_rig(rig).devices.encoders
+    encoders = load_rig(rig, needs_arm=False).devices.encoders
     if encoders is None or not described_by_dbc(encoders):
         raise RecordingError(
             f"{path}: beside other logs a CAN log is read by a DBC file; name it in [devices.encoders] of {rig}"
