@@ -203,7 +203,7 @@ def figures() -> tuple[Figure, ...]:
 
 TODAY = {
     "files": 761,
-    "code": 80_560,
+    "code": 80_640,
     "longest_function": 53,
     "one_importer": 2,
     "classes": 0,

@@ -110,7 +110,7 @@ class EncodersDevice(Struct, frozen=True, forbid_unknown_fields=True):
     options: Mapping[Name, bool | Whole | Number | Label] = {}  # further words of python-can for this interface
     dbc: FilePath | None = None  # file that describes plain encoders
     signals: PerJoint[Name] = ()  # "Message.Signal" of the DBC file
-    units_per_turn: PositiveFactor | None = None  # for signals whose unit is no angle
+    units_per_turn: PositiveFactor | None = None  # for signals whose unit is no angle, and CiA 406 logs without set-up
     acceleration_limit_rad_s2: Acceleration | None = None  # beyond it a step is a slip, not motion
 
     @property
