@@ -1,8 +1,8 @@
 """Encoder angles out of recorded CAN frames: what the driver of these encoders reads live.
 
 Plain encoders by the DBC file of the rig; those of CiA 406 by their set-up, which the log holds where it began before
-it: the scale that each states over SDO, and what TPDO2 carries. Without that, by `units_per_turn` of the rig file and the
-predefined TPDO2 (CiA 301, 7.3.3; CiA 406: the position is its first object).
+it: the scale that each states over SDO, and what TPDO2 carries. Without that, by `units_per_turn` of the rig file and
+the predefined TPDO2 (CiA 301, 7.3.3; CiA 406: the position is its first object).
 
 A row is complete when every encoder has sent, or when one sends again before the others did, as in
 `drivers.can_dbc.device`; its time is the mean of the frames' own. A SYNC begins a row, and is its time: then all latch.
