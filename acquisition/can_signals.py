@@ -1,13 +1,19 @@
-"""Encoder angles out of recorded CAN frames, by the DBC file of the rig: what the driver of plain encoders reads live.
+"""Encoder angles out of recorded CAN frames: what the driver of these encoders reads live.
+
+Plain encoders by the DBC file of the rig; those of CiA 406 by their set-up, which the log holds where it began before
+it: the scale that each states over SDO, and what TPDO2 carries. Without that, by `units_per_turn` of the rig file and
+the predefined TPDO2 (CiA 301, 7.3.3; CiA 406: the position is its first object).
 
 A row is complete when every encoder has sent, or when one sends again before the others did, as in
-`drivers.can_dbc.device`; its time is the mean of the frames' own.
+`drivers.can_dbc.device`; its time is the mean of the frames' own. A SYNC begins a row, and is its time: then all latch.
 """
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 
@@ -15,27 +21,65 @@ from acquisition.recording import Channel, Recording, RecordingError, Stream
 from acquisition.recording.can_frames import Frame, FrameFlag, frames_of, is_frames
 from acquisition.recording.foreign import Sheet
 from acquisition.recording.rig.devices import EncoderDriver, EncodersDevice
-from drivers.can_dbc.description import JointSignal, joint_signals
-from drivers.cia406.codec import SPEED_LIMIT_RAD_S, ContinuousAngle
+from drivers.can_dbc.description import joint_signals
+from drivers.cia406 import codec
+from drivers.cia406.codec import SPEED_LIMIT_RAD_S, ContinuousAngle, Scale
 
 STREAM, CHANNEL = "encoders", "position_rad"
 Row = tuple[float, tuple[float, ...]]
 
 
-def described_by_dbc(encoders: EncodersDevice | None) -> bool:
-    """Whether a rig's encoders are read by a DBC file."""
-    return encoders is not None and encoders.driver is EncoderDriver.CAN_DBC and encoders.dbc is not None
+SDO_ANSWER, SDO_REQUEST, PDO2 = 0x580, 0x600, 0x280  # and the node: the predefined connection set of CiA 301
+SET_UP = (codec.OPERATING_PARAMETERS, codec.UNITS_PER_TURN, codec.RANGE_UNITS, codec.TURN_RESOLUTION, codec.TURNS)
+
+
+class NoSetUpError(RecordingError):
+    """Nothing in log or rig file states what a count of the encoders is."""
+
+
+class EncoderSignal(Protocol):
+    """One encoder in the frames: of a DBC file, or a `NodePosition`."""
+
+    @property
+    def name(self) -> str: ...
+    @property
+    def frame(self) -> tuple[int, bool]: ...
+    @property
+    def scale(self) -> Scale: ...
+    @property
+    def offset_rad(self) -> float: ...
+    def counts(self, data: bytes) -> int | None: ...
+
+
+@dataclass(frozen=True)
+class NodePosition:
+    """The position of one CiA 406 encoder in its TPDO2."""
+
+    name: str
+    frame: tuple[int, bool]
+    scale: Scale
+    number: codec.MappedNumber
+    offset_rad: float = 0.0
+
+    def counts(self, data: bytes) -> int | None:
+        """None when the frame is too short."""
+        return self.number.read(data)
 
 
 def encoder_rows(recording: Recording, encoders: EncodersDevice) -> list[Row]:
     """Host time and angle of every joint, NaN where an encoder sent nothing for that row.
 
-    RecordingError where no frame is of these encoders, or several buses have them; DeviceRefused for a DBC file that
-    does not fit.
+    RecordingError where no frame is of these encoders, or several buses have them; NoSetUpError; DeviceRefused for a
+    DBC file that does not fit.
     """
-    joints = joint_signals(Path(encoders.dbc or ""), encoders.signals, encoders.units_per_turn)
-    ours = {joint.frame for joint in joints}
     buses = [list(frames_of(stream)) for stream in recording.streams.values() if is_frames(stream)]
+    plain = encoders.driver is EncoderDriver.CAN_DBC
+    joints: Sequence[EncoderSignal] = (
+        joint_signals(Path(encoders.dbc or ""), encoders.signals, encoders.units_per_turn)
+        if plain
+        else _node_positions(recording.path, [frame for bus in buses for frame in bus], encoders)
+    )
+    ours = {joint.frame for joint in joints}
     theirs = [bus for bus in buses if any((f.can_id, bool(f.flags & FrameFlag.EXTENDED)) in ours for f in bus)]
     if len(theirs) > 1:
         raise RecordingError(
@@ -43,11 +87,12 @@ def encoder_rows(recording: Recording, encoders: EncodersDevice) -> list[Row]:
         )
     frames = [frame for bus in buses for frame in bus] if not theirs else theirs[0]
     limit = encoders.acceleration_limit_rad_s2
-    rows = list(_rows(sorted(frames, key=lambda f: f.host_s), joints, math.inf if limit is None else limit))
+    sync = None if plain else codec.SYNC_ID
+    rows = list(_rows(sorted(frames, key=lambda f: f.host_s), joints, math.inf if limit is None else limit, sync))
     if not rows:
         raise RecordingError(
             f"{recording.path}: none of {len(frames)} frames is of {joints[0].name} … {joints[-1].name} of "
-            f"{encoders.dbc}; check [devices.encoders] of the rig file"
+            f"{encoders.dbc if plain else 'CiA 406'}; check [devices.encoders] of the rig file"
         )
     return rows
 
@@ -69,31 +114,84 @@ def encoder_sheet(rows: list[Row], recording: Recording, source: Path) -> Sheet:
     return Sheet(source, "", headings, ("",) * len(headings), cells, tuple(range(1, len(rows) + 1)))
 
 
-def _rows(frames: Iterable[Frame], joints: tuple[JointSignal, ...], acceleration_limit: float) -> Iterator[Row]:
+def _node_positions(source: Path, frames: Sequence[Frame], encoders: EncodersDevice) -> tuple[NodePosition, ...]:
+    """Of every node of the rig. NoSetUpError naming those whose counts have no size."""
+    found = [_node_position(node, _objects(frames, node), encoders.units_per_turn) for node in encoders.nodes]
+    missing = [str(node) for node, one in zip(encoders.nodes, found, strict=True) if one is None]
+    if missing:
+        raise NoSetUpError(
+            f"{source}: the set-up of encoder node {', '.join(missing)} is not in it (SDO answers of 6000h to 6502h), "
+            "so the size of a count is not known; give 'units_per_turn' in [devices.encoders] of the rig file"
+        )
+    return tuple(one for one in found if one is not None)
+
+
+def _node_position(
+    node: int, objects: Mapping[tuple[int, int], int], units_per_turn: float | None
+) -> NodePosition | None:
+    mapping = tuple(
+        codec.mapped_object(objects.get((codec.TPDO2_MAPPING, entry), 0))
+        for entry in range(1, objects.get((codec.TPDO2_MAPPING, 0), 0) + 1)
+    )
+    number = codec.mapped_number(mapping, codec.POSITION) or codec.MappedNumber(0, 32)
+    pdo_id = objects.get((codec.TPDO2_COMMUNICATION, 1), PDO2 + node) & 0x7FF
+    operating, units, span, resolution, turns = (objects.get((index, 0), 0) for index in SET_UP)
+    try:
+        scale = codec.scale_of(operating, units, span, resolution, max(turns, 1))
+    except ValueError:  # not in the log
+        if units_per_turn is None:
+            return None
+        # any range is whole turns, so the place within one turn, followed from row to row, is enough
+        scale = Scale(units_per_turn, round(units_per_turn), rises_counter_clockwise=True)
+    return NodePosition(f"node {node}", (pdo_id, False), scale, number)
+
+
+def _objects(frames: Iterable[Frame], node: int) -> dict[tuple[int, int], int]:
+    """What a node has answered or was set to over expedited SDO, the last of each object (CiA 301, 7.2.4.3)."""
+    objects: dict[tuple[int, int], int] = {}
+    kinds = {SDO_ANSWER + node: 0x40, SDO_REQUEST + node: 0x20}  # upload answered, download asked for
+    for frame in frames:
+        kind = kinds.get(frame.can_id)
+        if kind is None or len(frame.data) != 8 or frame.data[0] & 0xE2 != kind | 0x02:
+            continue
+        size = 4 - (frame.data[0] >> 2 & 3) if frame.data[0] & 1 else 4
+        index = int.from_bytes(frame.data[1:3], "little")
+        objects[index, frame.data[3]] = int.from_bytes(frame.data[4 : 4 + size], "little")
+    return objects
+
+
+def _rows(
+    frames: Iterable[Frame], joints: Sequence[EncoderSignal], acceleration_limit: float, sync: int | None
+) -> Iterator[Row]:
     angles = tuple(ContinuousAngle(joint.scale, SPEED_LIMIT_RAD_S, acceleration_limit) for joint in joints)
     places: dict[tuple[int, bool], list[int]] = {}
     for place, joint in enumerate(joints):
         places.setdefault(joint.frame, []).append(place)
     row: dict[int, tuple[float, float]] = {}  # place -> angle, time
+    latched_s: float | None = None
     for frame in frames:
-        here = places.get((frame.can_id, bool(frame.flags & FrameFlag.EXTENDED)), [])
-        if not here or frame.flags & (FrameFlag.REMOTE | FrameFlag.ERROR):
+        if frame.flags & (FrameFlag.REMOTE | FrameFlag.ERROR):
             continue
-        if any(place in row for place in here):
-            yield _finished(row, len(joints))
-            row = {}
+        here = places.get((frame.can_id, bool(frame.flags & FrameFlag.EXTENDED)), [])
+        begins = frame.can_id == sync and not here
+        if row and (begins or any(place in row for place in here)):
+            yield _finished(row, len(joints), latched_s)
+            row, latched_s = {}, None
+        if begins:
+            latched_s = frame.host_s
         for place in here:
             counts = joints[place].counts(frame.data)
             if counts is not None:
                 angle_rad = angles[place].follow(counts, frame.host_s) + joints[place].offset_rad
                 row[place] = angle_rad, frame.host_s
         if len(row) == len(joints):
-            yield _finished(row, len(joints))
-            row = {}
+            yield _finished(row, len(joints), latched_s)
+            row, latched_s = {}, None
     if row:
-        yield _finished(row, len(joints))
+        yield _finished(row, len(joints), latched_s)
 
 
-def _finished(row: dict[int, tuple[float, float]], n_joints: int) -> Row:
+def _finished(row: dict[int, tuple[float, float]], n_joints: int, latched_s: float | None) -> Row:
     angles = tuple(row[place][0] if place in row else math.nan for place in range(n_joints))
-    return math.fsum(time_s for _, time_s in row.values()) / len(row), angles
+    mean_s = math.fsum(time_s for _, time_s in row.values()) / len(row)
+    return mean_s if latched_s is None else latched_s, angles

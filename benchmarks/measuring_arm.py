@@ -174,7 +174,7 @@ def _dwelt(hand: DirectHand, arm: GuidedArm) -> tuple[Floats, Floats, Floats]:
         window = hand.dwell(rule.dwell_s)
     held = window.last(rule.dwell_s)
     shafts = np.array([world.shaft_at_rad(t_s) for t_s in held.t_s])
-    error_rad = (held.q_rad + HALF_COUNT_RAD - shafts - world.arm.off_centre_rad(shafts)).mean(axis=0)
+    error_rad = (held.q_rad + HALF_COUNT_RAD - shafts - world.arm.discs.off_centre_rad(shafts)).mean(axis=0)
     shaft = shafts.mean(axis=0)
     true_m = world.arm.tip_m(shafts).mean(axis=0)
     floor_m = true_m + world.arm.tip_m((shaft + error_rad)[None])[0] - world.arm.tip_m(shaft[None])[0]

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field, replace
 from importlib.metadata import entry_points
 from typing import Any
 
+from simulators.encoders.shaft import ShaftWorld
 from simulators.errors import HostError
 from simulators.faults.device_faults import DisturbedLight
 from simulators.faults.injector import Injector, with_faults
@@ -45,10 +46,12 @@ class EmulatedDevices:
         return [bench for bench in every if bench is not None]
 
 
-def build_devices(world: World | HandWorld, rig: Mapping[str, Any], robot_host: str | None) -> EmulatedDevices:
+def build_devices(
+    world: World | HandWorld | ShaftWorld, rig: Mapping[str, Any], robot_host: str | None
+) -> EmulatedDevices:
     """The benches of a rig; `robot_host` goes before the one in [devices.robot]. HostError when there is none."""
     wanted: Mapping[str, Any] = rig.get("devices", {})
-    light = None if isinstance(world, HandWorld) else DisturbedLight(world)
+    light = DisturbedLight(world) if isinstance(world, World) else None
     psd = _build(PSDS[wanted["psd"].get("driver", PSD_DAQ)], light, rig) if "psd" in wanted else None
     encoders = _build("encoders", world, rig) if "encoders" in wanted else None
     robot = _robot(world, rig, wanted["robot"], robot_host) if "robot" in wanted else None
@@ -79,7 +82,7 @@ def build_devices(world: World | HandWorld, rig: Mapping[str, Any], robot_host: 
 
 
 def _robot(
-    world: World | HandWorld, rig: Mapping[str, Any], device: Mapping[str, Any], robot_host: str | None
+    world: World | HandWorld | ShaftWorld, rig: Mapping[str, Any], device: Mapping[str, Any], robot_host: str | None
 ) -> Bench:
     host = robot_host or device.get("host")
     if host is None and not {"serial_port", "serial_number"} & device.keys():

@@ -2,7 +2,8 @@
 
     serve(rig, ServeOptions(robot_host="auto"), announce=print)
 
-A rig is emulated by one of two worlds: one with a robot, a laser and a fixture, or one with a hand on a measuring arm.
+A rig is emulated by one of three worlds: one with a robot, a laser and a fixture, one with a hand
+on a measuring arm, or, without an arm, the shaft of encoders alone.
 """
 
 import math
@@ -28,6 +29,7 @@ from simulators.devices import (
     with_robot_on,
     without_links,
 )
+from simulators.encoders.shaft import ShaftWorld, is_shaft, read_shaft
 from simulators.errors import HostError, PortBusy, WorldError
 from simulators.faults.injector import fault_verbs
 from simulators.hand.hand_rig import is_hand_held, read_hand_rig, write_hand_truth
@@ -44,7 +46,7 @@ from simulators.world.world import World
 class EmulatedWorld:
     """A world and what the process that serves it wants to know."""
 
-    physics: World | HandWorld
+    physics: World | HandWorld | ShaftWorld
     verbs: Mapping[str, Callable[..., Any]]  # of the side channel, beside those of the devices
     time_scale: float  # as the rig states
     write_truth: Callable[[Path], None]
@@ -57,6 +59,8 @@ def world_of(
 
     `given`: its geometry in numbers, instead of one that the seed draws.
     """
+    if is_shaft(rig):
+        return _shaft(rig, seed, hidden, given)
     if not is_hand_held(rig):
         return _driven(rig, seed, hidden, given)
     if given is not None:
@@ -82,6 +86,13 @@ def _hand_held(rig: Mapping[str, Any], seed: int | None, hidden: Sequence[Defect
     world = HandWorld.from_rig(rig, seed=seed)
     time_scale = read_hand_rig(rig).emulation.time_scale
     return EmulatedWorld(world, world.verbs, time_scale, partial(write_hand_truth, world.truth))
+
+
+def _shaft(rig: Mapping[str, Any], seed: int | None, hidden: Sequence[Defect], given: Given | None) -> EmulatedWorld:
+    if hidden or given is not None:
+        raise WorldError("a rig without an arm has its deviations in [emulation]; leave models and mechanisms out")
+    world = ShaftWorld.from_rig(rig, seed=seed)
+    return EmulatedWorld(world, world.verbs, read_shaft(rig).time_scale, world.write_truth)
 
 
 AUTO = "auto"

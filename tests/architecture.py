@@ -202,8 +202,8 @@ def figures() -> tuple[Figure, ...]:
 
 
 TODAY = {
-    "files": 759,
-    "code": 80_470,
+    "files": 763,
+    "code": 81_000,
     "longest_function": 53,
     "one_importer": 2,
     "classes": 0,

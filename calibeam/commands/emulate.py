@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Parameter
 
 from acquisition.recording.output import text_output
-from acquisition.recording.rig import load_rig, plain_rig, rig_text
+from acquisition.recording.rig import Rig, load_rig, plain_rig, rig_text
 from calibeam.overwriting import writes
 from calibeam.rig_files import rig_path
 
@@ -89,7 +89,7 @@ def emulate(
     from simulators.serve import ServeOptions, serve  # the physics takes a second to load: only here
 
     rig = rig_path(rig)
-    stated = load_rig(rig).devices.robot  # reports what is wrong with the file in its own words
+    loaded = load_rig(rig, needs_arm=False)  # reports what is wrong with the file in its own words
     plain = plain_rig(rig_text(rig), str(rig))
     given, mechanisms = _simulated(rig, plain, model, hide)
     options = ServeOptions(
@@ -104,7 +104,7 @@ def emulate(
         links=links,
         end_with_stdin=end_with_stdin,
     )
-    show = _print_json if json_ else partial(_print_table, rig, None if stated is None else stated.host)
+    show = _print_json if json_ else partial(_print_table, rig, loaded)
     serve(plain, options, show)
 
 
@@ -122,7 +122,9 @@ def _simulated(
     from calibrate.model.model_file import read_model
     from simulators.defects import WrittenError
 
-    given, found, notes = (None, (), ()) if model is None else emulated(read_model(model), load_rig(rig))
+    given, found, notes = (
+        (None, (), ()) if model is None else emulated(read_model(model), load_rig(rig, needs_arm=False))
+    )
     for note in notes:
         print(note, file=sys.stderr, flush=True)
     try:
@@ -137,15 +139,17 @@ def _print_json(where: dict[str, dict[str, Any]]) -> None:
     print(json.dumps(where), flush=True)
 
 
-def _print_table(rig: Path, host: str | None, where: dict[str, dict[str, Any]]) -> None:
-    """`host`: of the controller in the rig file."""
+def _print_table(rig: Path, loaded: Rig, where: dict[str, dict[str, Any]]) -> None:
     for device, address in where.items():
         print(f"{device:8s}", "  ".join(f"{key} {_words(value)}" for key, value in address.items()), flush=True)
     print("ready; Ctrl-C ends the emulators", flush=True)
+    host = None if loaded.devices.robot is None else loaded.devices.robot.host
     standing = where.get("robot", {}).get("host", host)
     if standing != host:
         print(f'first write host = "{standing}" under [devices.robot] of the rig file that clients read', flush=True)
-    if "control" in where:
+    if loaded.n_joints == 0:
+        print(f"a log of them: calibeam log encoders {rig}", flush=True)
+    elif "control" in where:
         control = f"{where['control']['host']}:{where['control']['port']}"
         print(f"a session on them: calibeam session {rig} --control {control} --out session-1", flush=True)
 

@@ -39,5 +39,6 @@ def export_command(recording: Path, *, out: Path, table: TableFormat = TableForm
     with taken_back(out):
         export(source, out, table)
         print(f"{out}: rig.toml and samples.{table.value}, samples: {len(source.samples)}")
-        for path in write_streams(source, out, table) if streams else ():
+        whole = streams or source.rig.n_joints == 0  # of encoders alone the streams are all there is
+        for path in write_streams(source, out, table) if whole else ():
             print(f"{path}: {path.stat().st_size} bytes")

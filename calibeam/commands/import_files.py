@@ -12,7 +12,7 @@ from rich.table import Table
 from rich.text import Text
 
 from acquisition.can_signals import STREAM as ENCODERS
-from acquisition.can_signals import described_by_dbc, encoder_rows, encoder_sheet, encoder_stream
+from acquisition.can_signals import NoSetUpError, encoder_rows, encoder_sheet, encoder_stream
 from acquisition.recording import Recording, RecordingError, SamplesError, read
 from acquisition.recording.can_log import SUFFIXES as CAN_SUFFIXES
 from acquisition.recording.can_log import CanImport, import_can
@@ -157,19 +157,23 @@ def _is_can(path: Path) -> bool:
 
 
 def _can(source: Path, out: Path, rig: Path) -> None:
-    """Every frame, and where the rig names a DBC file what the encoders sent."""
-    encoders = load_rig(rig).devices.encoders
-    if encoders is None or not described_by_dbc(encoders):
+    """Every frame, and where the rig has encoders what they sent."""
+    encoders = load_rig(rig, needs_arm=False).devices.encoders
+    if encoders is None:
         with taken_back(out):
             done = import_can(source, out, rig_text=rig_text(rig), software=SOFTWARE)
         print(f"{out}: {done.frames} CAN frames in {', '.join(done.streams)}")
     else:
-        done, frames = _frames(source, rig, out)
-        rows = encoder_rows(frames, encoders)
-        whole = replace(frames, streams={**frames.streams, ENCODERS: encoder_stream(rows)})
+        done, whole = _frames(source, rig, out)
+        try:
+            rows = encoder_rows(whole, encoders)
+            whole = replace(whole, streams={**whole.streams, ENCODERS: encoder_stream(rows)})
+            found = f", {len(rows)} rows of {ENCODERS}"
+        except NoSetUpError as why:
+            found = f"; no angles: {why}"
         with taken_back(out):
-            write_recording(whole, out, software=SOFTWARE, imported_from=source.name, started_utc=frames.started)
-        print(f"{out}: {done.frames} CAN frames in {', '.join(done.streams)}, {len(rows)} rows of {ENCODERS}")
+            write_recording(whole, out, software=SOFTWARE, imported_from=source.name, started_utc=whole.started)
+        print(f"{out}: {done.frames} CAN frames in {', '.join(done.streams)}{found}")
     if done.damage is not None:
         raise PartialResult(f"{source}: {done.damage}; everything before it is in {out}")
 
@@ -193,10 +197,11 @@ def _log_tables(path: Path, place: tuple[str | None, int | None], rig: Path, out
     """`place`: sheet and row of the headings."""
     if not _is_can(path):
         return read_log(path, place[0] if path.suffix.lower() in WORKBOOKS else None, place[1])
-    encoders = load_rig(rig).devices.encoders
-    if encoders is None or not described_by_dbc(encoders):
+    encoders = load_rig(rig, needs_arm=False).devices.encoders
+    if encoders is None:
         raise RecordingError(
-            f"{path}: beside other logs a CAN log is read by a DBC file; name it in [devices.encoders] of {rig}"
+            f"{path}: beside other logs a CAN log is read for its encoders; describe them in [devices.encoders] of "
+            f"{rig}"
         )
     done, frames = _frames(path, rig, out)
     if done.damage is not None:

@@ -66,7 +66,7 @@ def live_command(
     from calibeam.live.outlets import LiveViews, outlets
     from calibeam.live.page import PageAddress, live_page  # the web server takes a while to load: only here
 
-    loaded, clock = load_rig(rig), SystemClock()
+    loaded, clock = load_rig(rig, needs_arm=False), SystemClock()
     assumed = {} if model is None else _corrections(model, loaded)
     with (
         live_page(loaded, clock, PageAddress(host, port, token), "watch") as page,

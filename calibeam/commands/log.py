@@ -93,7 +93,7 @@ def encoders(
 
     """
     rotation = options.rotation
-    loaded = load_rig(rig)
+    loaded = load_rig(rig, needs_arm=False)
     device = loaded.devices.encoders
     if device is None:
         raise DeviceRefused(f"rig {loaded.name}: no [devices.encoders]; add it, with how the encoders are reached")
@@ -130,7 +130,7 @@ def tracker(
 
     """
     rotation = options.rotation
-    loaded = load_rig(rig)
+    loaded = load_rig(rig, needs_arm=False)
     device = loaded.devices.tracker
     if device is None:
         raise DeviceRefused(f"rig {loaded.name}: no [devices.tracker]; add it, with how the tracker is reached")

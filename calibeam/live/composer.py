@@ -1,6 +1,6 @@
 """Makes the messages of a page from the newest that was reported; once for all open pages."""
 
-from math import isfinite
+from math import isfinite, pi
 
 import msgspec
 import numpy as np
@@ -46,13 +46,16 @@ class Composer:
         """RigSays."""
         rig = self._rig
         joints = rig.arm.joints
+        limits_rad = [(joint.lower_rad, joint.upper_rad) for joint in joints]
+        if rig.devices.encoders is not None and not joints:
+            limits_rad = [(-pi, pi)] * len(rig.devices.encoders.named)
         return self._text(
             RigMessage(
                 rig.name,
                 self._job,
                 SOFTWARE,
-                [joint.lower_rad for joint in joints],
-                [joint.upper_rad for joint in joints],
+                [lower_rad for lower_rad, _ in limits_rad],
+                [upper_rad for _, upper_rad in limits_rad],
                 list(self._watch.asked_hz),
                 None if rig.fixture is None else rig.fixture.half_size_m,
                 self._reach_m(),
@@ -121,8 +124,8 @@ class Composer:
 
     def _reach_m(self) -> float:
         frames = self._scene.frames(np.zeros(self._rig.n_joints))
-        if frames is None:
-            return 1.0
+        if frames is None:  # a rig of encoders alone: nothing to draw
+            return 0.0
         return round(float(np.linalg.norm(np.diff(frames[:, :3, 3], axis=0), axis=1).sum()), 3)
 
     def _text(self, message: msgspec.Struct) -> str:

@@ -63,7 +63,7 @@ class Scene:
 
     def frames(self, q_rad: Floats) -> Floats | None:
         """T_base_frame (joint + 1, 4, 4); None for readings of another arm, or of a joint that does not answer."""
-        if q_rad.shape != (self._rig.n_joints,) or not np.isfinite(q_rad).all():
+        if self._arm is None or q_rad.shape != (self._rig.n_joints,) or not np.isfinite(q_rad).all():
             return None
         return self._arm.frames(q_rad[None])[0]
 
@@ -115,7 +115,7 @@ class Scene:
 
     def _rebuild(self) -> None:
         rig, tool, fixture = self._rig, self._rig.tool, self._rig.fixture
-        self._arm = RigArm.of_rig(rig, self._corrections)
+        self._arm = RigArm.of_rig(rig, self._corrections) if rig.n_joints else None
         self._assumed: AssumedRig | None = None
         self._faces: dict[int, tuple[Points, Points]] = {}  # by placement: T_base_face of PSD 1, PSD 2, as lists
         self._half_size_m = 0.0 if fixture is None else fixture.half_size_m

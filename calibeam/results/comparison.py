@@ -5,6 +5,7 @@ from calibeam.results.simulator import simulated_by_model
 from calibeam.software import SOFTWARE
 from calibrate.compare import compare_recordings
 from calibrate.compare.comparison_file import ComparisonFile
+from calibrate.compare.rig_and_streams import compare_logs
 from calibrate.model.model_file import ModelFile
 
 
@@ -23,6 +24,8 @@ def compare(
     """
     made_of = simulation if isinstance(simulation, ModelFile) else None
     simulated = simulated_by_model(simulation, measured) if isinstance(simulation, ModelFile) else simulation
+    if measured.rig.n_joints == simulated.rig.n_joints == 0:
+        return compare_logs(measured, simulated, SOFTWARE)
     return compare_recordings.compare(
         measured, simulated, SOFTWARE, diagnosed=diagnosed, made_of=made_of, structure=structure or made_of
     )

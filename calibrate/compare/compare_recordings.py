@@ -23,7 +23,6 @@ from calibrate.compare.comparison_file import (
     Level,
     Mismatch,
     NameOfCause,
-    StreamRecord,
 )
 from calibrate.compare.difference_explained import Explanation, explain, notes_of
 from calibrate.compare.fit_to_simulation import (
@@ -41,11 +40,16 @@ from calibrate.compare.matched import (
     zeros_between,
 )
 from calibrate.compare.mismatches import mismatches
-from calibrate.compare.rig_and_streams import SAYS, joint_mismatches, rig_mismatches, stream_mismatches, zero_mismatches
+from calibrate.compare.rig_and_streams import (
+    SAYS,
+    joint_mismatches,
+    rig_mismatches,
+    stream_mismatches,
+    stream_records,
+    zero_mismatches,
+)
 from calibrate.compare.rig_keys import rig_differences
 from calibrate.compare.streams import (
-    StreamPair,
-    late_against_joints,
     stream_pairs,
 )
 from calibrate.diagnose.assess import Named, Verdict
@@ -113,7 +117,7 @@ def compare(
         asked.readings,
         next((one.link for one in judged_links if one.parts), None),
         judged_links,
-        _streams(streams),
+        stream_records(streams),
         tuple(notes_of(asked)),
         asked.diagnosis,
     )
@@ -237,28 +241,3 @@ def _cause(name: Named) -> NameOfCause:
 
 def _number(value: float) -> float | None:
     return value if np.isfinite(value) else None
-
-
-def _streams(pairs: tuple[StreamPair, ...]) -> tuple[StreamRecord, ...]:
-    late = late_against_joints(pairs)
-    return tuple(
-        StreamRecord(
-            one.stream,
-            one.unit,
-            one.clock.status.value,
-            one.clock.offset_s,
-            one.clock.offset_sigma_s,
-            one.clock.drift,
-            one.clock.drift_sigma,
-            one.clock.middle_s,
-            one.samples,
-            one.level,
-            one.rms,
-            one.noise,
-            one.largest,
-            one.largest_s,
-            one.parts,
-            *late.get(one.stream, (None, None)),
-        )
-        for one in pairs
-    )

@@ -11,9 +11,12 @@ from calibrate.compare.chain import (
     Difference,
 )
 from calibrate.compare.comparison_file import (
+    ComparisonFile,
+    DifferenceRecord,
     Level,
     Mismatch,
     Side,
+    StreamRecord,
 )
 from calibrate.compare.fit_to_simulation import (
     SimulationFit,
@@ -21,17 +24,22 @@ from calibrate.compare.fit_to_simulation import (
 from calibrate.compare.link_differs import (
     JudgedLink,
 )
-from calibrate.compare.rig_keys import RigKey
+from calibrate.compare.rig_keys import RigKey, rig_differences
 from calibrate.compare.streams import (
+    ZEROLESS,
     NoiseDifference,
     StreamDifference,
     StreamPair,
     late_against_joints,
     noise_differences,
     stream_differences,
+    stream_pair,
 )
+from calibrate.diagnose.assess import Verdict
+from calibrate.diagnose.record.schema import SizeRecord
 from calibrate.diagnose.state import Fitted
 from calibrate.diagnose.streams import devices_of, streams_of
+from calibrate.errors import DataError
 from calibrate.model.effects.term import Size, plain
 from calibrate.quantities import angle, length
 
@@ -148,3 +156,96 @@ def _of_noise(one: NoiseDifference) -> Mismatch:
     says = f"Noise of the {one.stream} stream: {noise[0]} measured, {noise[1]} simulated"
     sizes = {f"noise_{one.unit}": Size(one.measured - one.simulated, float("nan"))}
     return Mismatch(Level.STREAMS, one.stream, "noise", sizes, says, decides=False)
+
+
+def stream_records(pairs: tuple[StreamPair, ...]) -> tuple[StreamRecord, ...]:
+    """As in the file."""
+    late = late_against_joints(pairs)
+    return tuple(
+        StreamRecord(
+            one.stream,
+            one.unit,
+            one.clock.status.value,
+            one.clock.offset_s,
+            one.clock.offset_sigma_s,
+            one.clock.drift,
+            one.clock.drift_sigma,
+            one.clock.middle_s,
+            one.samples,
+            one.level,
+            one.rms,
+            one.noise,
+            one.largest,
+            one.largest_s,
+            one.parts,
+            *late.get(one.stream, (None, None)),
+        )
+        for one in pairs
+    )
+
+
+def compare_logs(measured: Recording, simulated: Recording, software: str) -> ComparisonFile:
+    """Two logs of encoders without an arm: one motion, read twice or simulated, brought together by the motion itself.
+
+    DataError where one holds no readings of encoders, or the two hold different numbers of encoders.
+
+    Zeros of encoders are arbitrary and decide nothing; undecidable where the two do not show one motion.
+    """
+    devices = [devices_of(one).get(ZEROLESS) for one in (measured, simulated)]
+    for recording, device in zip((measured, simulated), devices, strict=True):
+        if device is None:
+            raise DataError(f"{recording.path}: no readings of encoders; give a log of `calibeam log encoders`")
+    one, two = (device for device in devices if device is not None)
+    if one.track.channels != two.track.channels:
+        raise DataError(
+            f"{measured.path}: {one.track.channels} encoders, {simulated.path}: {two.track.channels}; "
+            "give logs of the same encoders"
+        )
+    pair = stream_pair(ZEROLESS, one, two)
+    found = stream_mismatches(measured, simulated, None, (pair,))
+    records = tuple(
+        DifferenceRecord(
+            m.level.value,
+            m.where,
+            m.physics,
+            {name: SizeRecord(size.value, size.sigma) for name, size in m.sizes.items()},
+            m.side.value,
+            m.decides,
+            m.p,
+            m.says,
+            (),
+            {},
+        )
+        for m in found
+    )
+    verdict, says = _verdict_of_logs(found, pair)
+    return ComparisonFile(
+        1,
+        "calibeam-comparison",
+        software,
+        measured.path.name,
+        simulated.path.name,
+        0,
+        (),
+        (),
+        verdict.value,
+        says,
+        rig_differences(measured.rig, simulated.rig),
+        records,
+        (),
+        (),
+        None,
+        (),
+        stream_records((pair,)),
+        (),
+        None,
+    )
+
+
+def _verdict_of_logs(found: list[Mismatch], pair: StreamPair) -> tuple[Verdict, str]:
+    if any(m.decides for m in found):
+        return Verdict.MISMATCH, "The two logs differ."
+    if pair.parts is None:
+        why = f"the two logs do not show one motion ({pair.clock.status.value})"
+        return Verdict.UNDECIDABLE, f"Nothing can be compared: {why}."
+    return Verdict.CONSISTENT, "The encoders read the same in both logs to within the noise."

@@ -59,14 +59,16 @@ def stream_pairs(measured: Mapping[str, StreamDevice], simulated: Mapping[str, S
 
     Where the arms were sent otherwise (a servo corrects what it sees), the others do not part: nothing is expected.
     """
-    pairs = [_pair(name, measured[name], simulated[name]) for name in ORDER if name in measured and name in simulated]
+    pairs = [
+        stream_pair(name, measured[name], simulated[name]) for name in ORDER if name in measured and name in simulated
+    ]
     sent = next((pair for pair in pairs if pair.stream == SENT), None)
     if sent is not None and sent.parts is False:
         return tuple(pairs)
     return tuple(replace(pair, parts=None) for pair in pairs)
 
 
-def _pair(name: str, measured: StreamDevice, simulated: StreamDevice) -> StreamPair:
+def stream_pair(name: str, measured: StreamDevice, simulated: StreamDevice) -> StreamPair:
     """Two sessions were not recorded by one host at one time, so its stamps show nothing: the motion itself does."""
     one, two = measured.track.read(), simulated.track.read()
     clock = clock_between(two, one) if one.channels == two.channels else ClockFit(ClockStatus.UNRELATED)

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from simulators.arm.kinematics import moved
+from simulators.encoders.discs import TrueDisc, draw_disc
 from simulators.errors import WorldError
 
 Vector = tuple[float, float, float]
@@ -151,17 +152,8 @@ def read_hand_rig(rig: Mapping[str, Any]) -> HandRig:
 Floats = NDArray[np.float64]
 SCHEMA = 1
 KIND = "hand-held-arm"
-LINES = 256  # groups of graduation lines a turn: a head reads some hundred lines at a time and averages them
 CYCLES = (-3, -2, -1, 2, 3)  # error motions of an axis a turn, see simulators/hand/held_arm.py
 AXIAL_CYCLES = (1, 2, 3)
-
-
-class TrueDisc(msgspec.Struct, frozen=True):
-    """One encoder: its centre off the shaft, seen from the disc, and the angle that each group of lines adds."""
-
-    eccentricity_m: float
-    bearing_rad: float
-    graduation_rad: tuple[float, ...]
 
 
 class TrueAxis(msgspec.Struct, frozen=True):
@@ -229,7 +221,7 @@ def draw_hand_truth(rig: HandRig, seed: int) -> HandTruth:
         seed=seed,
         parts=tuple(_made(one, sigma, part) for one in drawn),
         joint_zero_rad=tuple((sigma.joint_zero_max_rad * zero.uniform(-1.0, 1.0, n)).tolist()),
-        discs=tuple(_disc(sigma, disc) for _ in range(n)),
+        discs=tuple(draw_disc(sigma.disc_eccentricity_m, sigma.graduation_rad, disc) for _ in range(n)),
         axes=tuple(_axis(sigma, axis) for _ in range(n)),
         runouts=tuple(_runout(sigma, runout) for _ in range(n)),
         tool_point_m=rig.tool.point_m,
@@ -246,12 +238,6 @@ def _made(drawn: Part, sigma: HandEmulation, rng: np.random.Generator) -> Part:
     off = moved(sigma.length_sigma_m * rng.standard_normal(3), sigma.angle_sigma_rad * rng.standard_normal(3))
     true = nominal @ off
     return Part(vector(true[:3, 3]), vector(Rotation.from_matrix(true[:3, :3]).as_rotvec()))
-
-
-def _disc(sigma: HandEmulation, rng: np.random.Generator) -> TrueDisc:
-    x_m, y_m = sigma.disc_eccentricity_m * rng.standard_normal(2)
-    lines_rad = sigma.graduation_rad * rng.standard_normal(LINES)
-    return TrueDisc(float(np.hypot(x_m, y_m)), float(np.arctan2(y_m, x_m)), tuple(lines_rad.tolist()))
 
 
 def _axis(sigma: HandEmulation, rng: np.random.Generator) -> TrueAxis:

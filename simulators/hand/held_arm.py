@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simulators.arm.kinematics import Arm, Frames, forward, jacobian, moved
-from simulators.defects.encoder import RADIUS_M
+from simulators.encoders.discs import Discs
 from simulators.hand.hand_rig import HandEmulation, HandRig, HandTruth, TrueAxis, TrueRunout
 
 Floats = NDArray[np.float64]
@@ -89,29 +89,12 @@ class TrueArm:
         )
         self._tool_m = np.array(truth.tool_point_m)
         self._bearings = Bearings(truth.axes, truth.runouts)
-        self._eccentric_m = np.array([disc.eccentricity_m for disc in truth.discs])
-        self._bearing_rad = np.array([disc.bearing_rad for disc in truth.discs])
-        self._lines_rad = np.array([disc.graduation_rad for disc in truth.discs])
+        self.discs = Discs(truth.discs)
         self._yields_rad_n = rig.emulation.joint_compliance_rad_nm * rig.emulation.hand_force_n
 
     @property
     def n_joints(self) -> int:
         return len(self.lower_rad)
-
-    def off_centre_rad(self, shaft_rad: Floats) -> Floats:
-        """(row, n) what discs off their shafts add: exact, two points on a plane (defects/encoder.py)."""
-        turn_rad = shaft_rad - self._bearing_rad
-        aside_m = self._eccentric_m * np.sin(turn_rad)
-        return -np.arctan2(aside_m, RADIUS_M + self._eccentric_m * np.cos(turn_rad))
-
-    def graduation_rad(self, shaft_rad: Floats) -> Floats:
-        """(row, n) what unevenly divided discs add, straight between groups of lines."""
-        groups = self._lines_rad.shape[1]
-        place = np.mod(shaft_rad, 2.0 * np.pi) / (2.0 * np.pi) * groups
-        before = np.floor(place).astype(np.intp) % groups
-        share, joint = place - np.floor(place), np.arange(self.n_joints)
-        lines = self._lines_rad
-        return (1.0 - share) * lines[joint, before] + share * lines[joint, (before + 1) % groups]
 
     def tip_m(self, shaft_rad: Floats) -> Floats:
         """(row, 3) middle of the probe's ball in the base."""

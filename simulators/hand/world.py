@@ -57,7 +57,9 @@ class HandWorld:
     def read_rad(self, shaft_rad: Floats) -> Floats:
         """(row, n) readings of shafts at these angles, with the noise of one reading."""
         noise_rad = self.truth.encoder_noise_rad * self._noise.standard_normal(shaft_rad.shape)
-        return shaft_rad + self.arm.off_centre_rad(shaft_rad) + self.arm.graduation_rad(shaft_rad) + noise_rad
+        return (
+            shaft_rad + self.arm.discs.off_centre_rad(shaft_rad) + self.arm.discs.graduation_rad(shaft_rad) + noise_rad
+        )
 
     @property
     def verbs(self) -> Mapping[str, Callable[..., Any]]:

@@ -94,7 +94,8 @@ class PsdDevice(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class EncodersDevice(Struct, frozen=True, forbid_unknown_fields=True):
-    """The encoders' CAN bus; `interface` and `channel` are python-can's words; a node, or signal, per joint, in order.
+    """The encoders' CAN bus; `interface` and `channel` are python-can's words; a node, or signal, per joint, in order
+    (of a rig without an arm: per encoder).
 
     `serial_number` of a serial adapter's USB plug stands in place of `channel`, which changes with the plug.
     """
@@ -109,8 +110,13 @@ class EncodersDevice(Struct, frozen=True, forbid_unknown_fields=True):
     options: Mapping[Name, bool | Whole | Number | Label] = {}  # further words of python-can for this interface
     dbc: FilePath | None = None  # file that describes plain encoders
     signals: PerJoint[Name] = ()  # "Message.Signal" of the DBC file
-    units_per_turn: PositiveFactor | None = None  # for signals whose unit is no angle
+    units_per_turn: PositiveFactor | None = None  # for signals whose unit is no angle, and CiA 406 logs without set-up
     acceleration_limit_rad_s2: Acceleration | None = None  # beyond it a step is a slip, not motion
+
+    @property
+    def named(self) -> tuple[int, ...] | tuple[str, ...]:
+        """Nodes, or signals, by the driver."""
+        return self.signals if self.driver is EncoderDriver.CAN_DBC else self.nodes
 
 
 class RobotRegister(Struct, frozen=True, forbid_unknown_fields=True):

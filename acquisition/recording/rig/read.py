@@ -17,12 +17,19 @@ from acquisition.recording.rig.schema import EMULATION_KEYS, ArmModel, Rig
 from acquisition.recording.rig.senses import arm_as_counted
 
 
-def load_rig(path: Path | str) -> Rig:
-    """The rig of a file. RigFileError naming file, line, key, value and remedy.
+def load_rig(path: Path | str, *, needs_arm: bool = True) -> Rig:
+    """The rig of a file. RigFileError naming file, line, key, value and remedy; also for a rig of encoders alone where
+    an arm is needed.
 
     Files that it names for its devices (`dbc`, `error_maps`) are looked for from its own folder on.
     """
-    return _with_files_from(Path(path).parent, parse_rig(rig_text(path), str(path)))
+    rig = parse_rig(rig_text(path), str(path))
+    if needs_arm and rig.n_joints == 0:
+        raise RigFileError(
+            f"{path}: this command needs an arm, and the file has none; add [arm] with its joints, as "
+            "`calibeam rig new` writes it"
+        )
+    return _with_files_from(Path(path).parent, rig)
 
 
 def rig_text(path: Path | str) -> str:

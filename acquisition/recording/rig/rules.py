@@ -44,7 +44,7 @@ TRACKER: KeyPath = ("devices", "tracker")
 KPA101_MOST_HZ = 400.0  # two units on lines of 115200 baud
 DAQ_ONLY = ("port", "serial_number")
 PAIR_ONLY = ("ports", "serial_numbers", "length_m")
-CIA406_ONLY, DBC_ONLY = ("nodes",), ("dbc", "signals", "units_per_turn")
+CIA406_ONLY, DBC_ONLY = ("nodes",), ("dbc", "signals")
 FASTEST_POLL_HZ = 500.0
 OWN_NAMES = ("psd", "spots", "encoders", "robot", "tracker", "camera", "can", "control")  # streams and emulators
 SLOWEST_TRACKER_HZ = 5.0  # a stream that pauses longer counts as silent
@@ -54,6 +54,8 @@ SHORTEST = 1e-6  # feels right: no hand writes a direction so short
 
 def faults(rig: Rig) -> Iterator[Fault]:
     """All that contradicts itself in a rig whose types are right, in the order of the file's sections."""
+    if rig.n_joints == 0:
+        yield from _no_arm_faults(rig)
     for index, joint in enumerate(rig.arm.joints):
         yield from _joint_faults(("arm", "joint", index), joint, rig.arm.model)
     yield from _sense_faults(rig)
@@ -65,6 +67,17 @@ def faults(rig: Rig) -> Iterator[Fault]:
     yield from _instrument_faults(rig)
     yield from _robot_faults(rig)
     yield from _motion_faults(rig)
+
+
+def _no_arm_faults(rig: Rig) -> Iterator[Fault]:
+    """Encoders are logged without an arm; nothing else is measured without one."""
+    devices = rig.devices
+    if devices.encoders is None:
+        yield (), "the file needs the key 'arm'; add it (only a rig of [devices.encoders] does without)"
+    on_arm = {"[devices.psd]": devices.psd, "[devices.robot]": devices.robot, "[devices.tracker]": devices.tracker}
+    on_arm |= {"[fixture]": rig.fixture, "[camera]": rig.camera}
+    for name in (name for name, there in on_arm.items() if there is not None):
+        yield (), f"{name} needs an arm: add [arm], or delete {name} to log encoders alone"
 
 
 def _sense_faults(rig: Rig) -> Iterator[Fault]:
@@ -310,8 +323,10 @@ def _encoder_faults(encoders: EncodersDevice, n_joints: int) -> Iterator[Fault]:
     if plain and encoders.dbc is None:
         yield ENCODERS, "[devices.encoders] of driver \"can-dbc\" needs 'dbc', the file that describes the encoders"
     key = "signals" if plain else "nodes"
-    named = encoders.signals if plain else encoders.nodes
-    if len(named) != n_joints:
+    named = encoders.named
+    if n_joints == 0 and not named:
+        yield ENCODERS, f"[devices.encoders] names no encoder; give '{key}'"
+    elif n_joints not in (0, len(named)):
         yield (
             (*ENCODERS, key),
             f"{key} = {list(named)} names {len(named)} encoders, the arm has {n_joints} joints; name one per joint",

@@ -125,6 +125,9 @@ class Arm(Struct, frozen=True, forbid_unknown_fields=True):
     make: Make | None = None  # None: not stated
 
 
+NO_ARM = Arm(ArmModel.DH, ())  # of a rig that only logs encoders
+
+
 class Tool(Struct, frozen=True, forbid_unknown_fields=True):
     """What hangs at the flange, in the flange frame. `laser_direction` has length 1 after reading."""
 
@@ -376,7 +379,7 @@ class Rig(Struct, frozen=True, forbid_unknown_fields=True):
 
     schema: Literal[1]
     name: Name
-    arm: Arm
+    arm: Arm = NO_ARM
     tool: Tool = Tool()
     target_list: Few[FlangeTarget] = field(name="target", default=())
     fixture: Fixture | None = None
@@ -399,6 +402,7 @@ class Rig(Struct, frozen=True, forbid_unknown_fields=True):
 
     @property
     def n_joints(self) -> int:
+        """0 of a rig without an arm."""
         return len(self.arm.joints)
 
     @property

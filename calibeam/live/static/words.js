@@ -18,6 +18,7 @@ export function sayRig(rig) {
   put(get("rig-name"), rig.name);
   document.title = `${rig.name} – calibeam live`;
   put(get("stop-does"), rig.job === "watch" ? "STOP ends the program that the controller runs." : "STOP ends the session; what was recorded is kept.");
+  document.querySelector(".panel.robot").hidden = rig.reach_m === 0; // a rig of encoders alone has no arm
   put(get("robot-head"), rig.half_m === null ? "Arm" : "Robot and beam");
   document.querySelector("[data-view=beam]").hidden = rig.half_m === null;
   for (const id of ["face-1", "face-2"]) get(id).hidden = !rig.devices.includes("psd");

@@ -89,7 +89,14 @@ def without_gross_errors(
 
 
 def refuse_wrong_file(rig: Rig, samples: Samples) -> None:
-    """DataError that names which conventions the file is written by, where they are not those of the rig."""
+    """DataError that names which conventions the file is written by, where they are not those of the rig; also for a
+    rig without an arm.
+    """
+    if rig.n_joints == 0:
+        raise DataError(
+            f"rig {rig.name} has no arm: a log of encoders alone holds no poses to fit; `calibeam check` and `calibeam "
+            "compare` examine it, or add [arm] to the rig file and measure poses"
+        )
     if gross_errors := wrong_file(rig, samples):
         raise DataError("; besides, ".join(gross_error.says for gross_error in gross_errors))
 

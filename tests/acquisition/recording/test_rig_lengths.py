@@ -92,7 +92,8 @@ def test_the_largest_machines_are_within_the_bounds() -> None:
 
 @pytest.mark.parametrize("name", sorted(path.name for path in (Path(__file__).parents[3] / "rigs").glob("*.toml")))
 def test_every_shipped_rig_is_within_the_bounds(name: str) -> None:
-    assert load_rig(Path(__file__).parents[3] / "rigs" / name).n_joints >= 6
+    rig = load_rig(Path(__file__).parents[3] / "rigs" / name, needs_arm=False)
+    assert rig.n_joints >= 6 or name == "encoders.toml"
 
 
 def test_a_position_beyond_a_kilometre_is_refused_with_the_same_remedy() -> None:

@@ -70,7 +70,7 @@ def true_place_m(made: HandWorld, one: Reading) -> np.ndarray:
     """Where the true arm has its probe at this reading, graduation and noise aside."""
     shaft = one.q_rad.copy()
     for _ in range(3):
-        shaft = one.q_rad - made.arm.off_centre_rad(shaft[None])[0]
+        shaft = one.q_rad - made.arm.discs.off_centre_rad(shaft[None])[0]
     return made.arm.tip_m(shaft[None])[0]
 
 
@@ -96,7 +96,7 @@ def test_the_arm_is_identified_to_micrometres_and_its_discs_with_it(taken) -> No
     model = record_of(found, RigIdentity(RIG.name, rig_sha256(TEXT), TEXT), "local-poe")
     rng = np.random.default_rng(2)
     shafts = np.array([one.q_rad for one in summary.readings]) + rng.normal(0, 0.05, (len(summary.readings), 6))
-    tips = Predictor.of(model).tip_m(shafts + made.arm.off_centre_rad(shafts))
+    tips = Predictor.of(model).tip_m(shafts + made.arm.discs.off_centre_rad(shafts))
     true = made.arm.tip_m(shafts)
     spans = np.linalg.norm(tips[:, None] - tips[None], axis=2) - np.linalg.norm(true[:, None] - true[None], axis=2)
     assert np.sqrt(np.mean(spans**2)) < 15e-6

@@ -76,7 +76,7 @@ def test_a_perfect_arm_shows_its_shafts():
 def test_a_disc_off_its_shaft_is_read_wrong_once_a_turn_by_its_share_of_the_radius():
     world = HandWorld.from_rig(rig(disc_eccentricity_m=2e-6))
     turn = np.linspace(-math.pi, math.pi, 400)[:, None] * np.ones((1, 6))
-    error = world.arm.off_centre_rad(turn)
+    error = world.arm.discs.off_centre_rad(turn)
     sizes = [disc.eccentricity_m / 0.02 for disc in world.truth.discs]
     np.testing.assert_allclose(np.abs(error).max(axis=0), sizes, rtol=1e-3)
     np.testing.assert_allclose(error[0], error[-1], atol=1e-15)
@@ -85,8 +85,8 @@ def test_a_disc_off_its_shaft_is_read_wrong_once_a_turn_by_its_share_of_the_radi
 def test_graduation_errors_come_back_with_every_turn_and_do_not_jump():
     world = HandWorld.from_rig(rig(graduation_rad=3e-6))
     angle = np.linspace(-1.0, 1.0, 20_001)[:, None] * np.ones((1, 6))
-    error = world.arm.graduation_rad(angle)
-    np.testing.assert_allclose(world.arm.graduation_rad(angle + 2.0 * math.pi), error, atol=1e-12)
+    error = world.arm.discs.graduation_rad(angle)
+    np.testing.assert_allclose(world.arm.discs.graduation_rad(angle + 2.0 * math.pi), error, atol=1e-12)
     assert 1.5e-6 < error.std() < 3.5e-6
     assert np.abs(np.diff(error, axis=0)).max() < 1e-7
 
