@@ -202,8 +202,8 @@ def figures() -> tuple[Figure, ...]:
 
 
 TODAY = {
-    "files": 759,
-    "code": 80_350,
+    "files": 760,
+    "code": 80_490,
     "longest_function": 53,
     "one_importer": 2,
     "classes": 0,
