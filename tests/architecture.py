@@ -202,8 +202,8 @@ def figures() -> tuple[Figure, ...]:
 
 
 TODAY = {
-    "files": 760,
-    "code": 80_490,
+    "files": 762,
+    "code": 80_870,
     "longest_function": 53,
     "one_importer": 2,
     "classes": 0,

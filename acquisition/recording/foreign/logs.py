@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from acquisition.recording.errors import RecordingError, SamplesError, shown
 from acquisition.recording.files.explain import spelt
-from acquisition.recording.foreign.column_meanings import CAMERA, POSE_MATRIX, TIME, UNUSED, Group, clauses, name_of
+from acquisition.recording.foreign.column_meanings import POSE_MATRIX, TIME, UNUSED, Group, clauses, name_of, prefix_of
 from acquisition.recording.foreign.conversion import (
     EPOCH_S,
     Exact,
@@ -211,7 +211,7 @@ def _stream(table: Understanding, base: Exact) -> Stream:
 
 def _channels(table: Understanding, group: Group) -> Iterator[tuple[Channel, NDArray[Any]]]:
     values = converted(table, group)
-    prefix = "camera_" if group.meaning.startswith(CAMERA) else ""
+    prefix = prefix_of(group.meaning)
     if group.meaning in _JOINT_CHANNELS:
         unit = "rad/s" if group.meaning == "qd" else "rad"
         yield Channel(_JOINT_CHANNELS[group.meaning], unit, values.shape[1:]), values
