@@ -202,8 +202,8 @@ def figures() -> tuple[Figure, ...]:
 
 
 TODAY = {
-    "files": 763,
-    "code": 81_000,
+    "files": 766,
+    "code": 81_500,
     "longest_function": 53,
     "one_importer": 2,
     "classes": 0,

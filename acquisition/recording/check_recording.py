@@ -26,6 +26,7 @@ class Problem(enum.Enum):
     NO_SAMPLES = "no-samples"
     SATURATED = "saturated"
     ERROR_FRAMES = "error-frames"
+    CONTROLLER_ARM = "controller-arm"  # computed by whoever has the kinematics: calibrate/fit/controller_arm.py
 
 
 class Severity(enum.Enum):

@@ -31,6 +31,7 @@ WIRE = "wire_m"
 SEAT = "seat"
 BAR, BAR_END = "bar", "bar_end"
 MEASURED = (*SPOTS, WIRE, *(f"{device}{name}" for device in ("", "camera_") for name in (*POSITION, *ORIENTATION)))
+CONTROLLER = tuple(f"controller_{name}" for name in (*POSITION, *ORIENTATION))  # its own pose of its tool in its base
 TARGET = "target"  # which [[target]] of the rig a row is of
 COMPLETE_PER_JOINT = (("q", "_rad"), ("cmd", "_rad"), ("enc", "_rad"))  # one column for every joint, or none
 

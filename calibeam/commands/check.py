@@ -17,6 +17,9 @@ from acquisition.recording.samples import Floats
 from calibeam.console import Console
 from calibeam.devices.check import check_devices
 from calibeam.outcome import CheckFailed
+from calibeam.overwriting import writes
+from calibeam.results.controller_findings import RIG_FILE, arm_of_controller, controller_findings, write_controller_arm
+from calibrate.errors import DataError
 from drivers.clock import SystemClock
 
 SAME_S = 1.0  # longer than any driver keeps a sample
@@ -24,13 +27,19 @@ EMULATED = 0.01  # of the rate: no clock of a device runs so far off; emulators 
 MOST_LINES = 20  # findings of one file printed one by one; a script gets all of them with --json
 
 
-def check_recording(path: Path, *, as_json: bool = False) -> bool:
-    """Print what is in it and what was found; True when there is no error. RecordingError when it cannot be read."""
+def check_recording(path: Path, *, as_json: bool = False, controller_arm: Path | None = None) -> bool:
+    """Print what is in it and what was found; True when there is no error. RecordingError when it cannot be read.
+
+    `controller_arm`: where the controller's arm is written. DataError where the recording does not show it.
+    """
     files = segments(path) if path.is_dir() else []
     good = True
     for file in files or [path]:
         recording = read(file)
-        findings = check(recording)
+        arm = arm_of_controller(recording)
+        if controller_arm is not None:
+            write_controller_arm(recording, arm, controller_arm)
+        findings = (*check(recording), *controller_findings(arm))
         good = good and not any(finding.is_error for finding in findings)
         if as_json:
             print(msgspec.json.encode(_as_json(recording, findings)).decode())
@@ -109,7 +118,13 @@ def _model(model: ClockModel) -> dict[str, Any]:
     return msgspec.to_builtins(model) | {"status": model.status.name.lower()}
 
 
-def check_command(what: Path, *, json_: Annotated[bool, Parameter(name="--json")] = False) -> None:
+@writes(controller_arm=RIG_FILE)
+def check_command(
+    what: Path,
+    *,
+    controller_arm: Path | None = None,
+    json_: Annotated[bool, Parameter(name="--json")] = False,
+) -> None:
     """Check every device of a rig, or check a recording; no motion.
 
     One line a device; the arm does not move. A recording is checked for missing samples, clocks and gross errors.
@@ -119,6 +134,7 @@ def check_command(what: Path, *, json_: Annotated[bool, Parameter(name="--json")
     ```
     calibeam check rigs/ur5e-dual-psd.toml
     calibeam check session-1/recording.mcap
+    calibeam check session-1/recording.mcap --controller-arm controller.toml
     ```
 
     Each line starts with ok or error; then what the device is, its firmware, rate and noise, what is wrong and the
@@ -128,14 +144,18 @@ def check_command(what: Path, *, json_: Annotated[bool, Parameter(name="--json")
     ----------
     what
         A rig file (.toml), a recording (.mcap), or a folder of log segments.
+    controller_arm
+        Write the arm that the robot's controller computes with as a rig file, from its tool poses in the recording.
     json_
         Print one line of JSON for each device or file.
 
     """
     if what.suffix != ".toml":
-        if not check_recording(what, as_json=json_):
+        if not check_recording(what, as_json=json_, controller_arm=controller_arm):
             raise CheckFailed(f"{what}: it has errors, see above")
         return
+    if controller_arm is not None:
+        raise DataError(f"--controller-arm: {what} is a rig file; give a recording with the controller's tool poses")
     rig = load_rig(what, needs_arm=False)
     bad: list[str] = []
     for found in check_devices(rig, SystemClock()):

@@ -11,6 +11,7 @@ from acquisition.recording.rig import Rig
 from calibeam.console import Console
 from calibeam.overwriting import writes
 from calibeam.printing.identification import print_identification, refitted_lines
+from calibeam.results.controller_findings import controller_notes
 from calibeam.results.identification import (
     Planned,
     identify_session,
@@ -118,7 +119,7 @@ def _identify(
     refuse_undetermined(result.status, result.estimates)
     model = write_session_model(result, source, out, planned)
     print_identification(console, result, session_evidence(source, model), verbose=verbose)
-    for sentence in unused_columns(source.samples):
+    for sentence in (*unused_columns(source.samples), *controller_notes(source)):
         console.print(sentence, markup=False, highlight=False)
     console.print(f"model: {out}", markup=False)
     _export(console, rig_as_planned(source.rig, planned.plan), out, export)

@@ -71,7 +71,14 @@ def poe_text(arm: DrawnArm) -> str:
     return rig_file_text(arm.name, "local-poe", joints, _pose(arm.T_flange), arm.notes)
 
 
-def rig_file_text(name: str, model: str, joints: Sequence[Joint], flange: Pose, notes: Sequence[str]) -> str:
+def rig_file_text(
+    name: str,
+    model: str,
+    joints: Sequence[Joint],
+    flange: Pose,
+    notes: Sequence[str],
+    point_m: Sequence[float] = (0.0, 0.0, 0.0),
+) -> str:
     """A rig file with a target on the flange, ready to be adapted."""
     lines = [*(f"# {line}" for note in notes for line in note.splitlines())]
     lines += ["schema = 1", f"name = {_quoted(name)}", "", "[arm]", f'model = "{model}"']
@@ -80,7 +87,11 @@ def rig_file_text(name: str, model: str, joints: Sequence[Joint], flange: Pose, 
         lines += ["", f"[[arm.joint]]  # {number}", *_keys(joint)]
     if flange != Pose():
         lines += ["", "[arm.flange]", *_keys(flange)]
-    lines += ["", "[tool]", "point_m = [0.0, 0.0, 0.0]  # the target in the flange frame: measure it, or run tool-axes"]
+    lines += [
+        "",
+        "[tool]",
+        f"point_m = {[*point_m]}  # the target in the flange frame: measure it, or run tool-axes",
+    ]
     return "\n".join(lines) + "\n"
 
 

@@ -7,7 +7,8 @@ import importlib
 import math
 import warnings
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, get_args
@@ -19,7 +20,7 @@ from acquisition.recording import Samples
 
 if TYPE_CHECKING:
     from calibeam.results.identification import JudgedModel
-    from calibrate.apply.correct import Corrected, Wanted
+    from calibrate.apply.correct import Corrected, ToolKinematics, Wanted
     from calibrate.apply.predicting import Placed
     from calibrate.model.model_file import ModelFile, ModelParameter
 
@@ -154,6 +155,60 @@ class Model:
         options = Options(None if tool is None else np.asarray(tool, dtype=np.float64), side, overshoot_rad)
         return correct(self.file, wanted, MotionInverse(RigArm.of_rig(rig)), options)
 
+    def forward(
+        self, q_rad: Floats, conditions: Conditions = None, *, tool: Floats | None = None, nominal: bool = False
+    ) -> Floats:
+        """T_base_tool (pose, 4, 4), m, of the real tool at joint readings (pose, joint) or (joint,), rad, with physics.
+
+        `conditions`: as of `flange`; `tool`: as of `correct`. What is missing or beyond its recorded range is named in
+        a UserWarning. `nominal`: of the rig file's arm instead, where a controller or planner that computes with it has
+        the tool. DataError for joints of another shape, and where an effect cannot be evaluated.
+        """
+        q, known = np.atleast_2d(np.asarray(q_rad, dtype=np.float64)), self._kinematics(tool)
+        if nominal:
+            return known.nominal(q)
+        T, notes = known.forward(q, _columns(conditions, len(q)))
+        _warn(notes)
+        return T
+
+    def inverse(
+        self, T_base_tool: Floats, conditions: Conditions = None, *, near_rad: Floats, tool: Floats | None = None
+    ) -> Floats:
+        """Joint readings (pose, joint), rad, at which `forward` gives the poses (pose, 4, 4) or (4, 4) within 1e-9.
+
+        `near_rad` (joint,) or (pose, joint): the nearest posture of the nominal arm is where the search starts.
+        Conditions count as stated: nothing follows from the order of the poses. `tool`: as of `correct`. DataError
+        names the first pose that has no joints, with the reason; a UserWarning a pose near a singular posture, one that
+        an effect which jumps does not let the tool reach, and what `forward` warns of.
+        """
+        from calibeam.motion.motion_inverse import MotionInverse
+        from calibrate.errors import DataError
+
+        known = self._kinematics(tool)
+        n, near = known.arms.n_joints, np.asarray(near_rad, dtype=np.float64)
+        wanted = _wanted(np.asarray(T_base_tool, dtype=np.float64), conditions or {}, None, n)
+        if near.shape not in ((n,), (len(wanted), n)) or not np.isfinite(near).all():
+            raise DataError(f"near_rad of shape {near.shape}: give ({n},) or ({len(wanted)}, {n}), all finite, in rad")
+        wanted.near_rad[:] = near
+        q_rad, notes = known.inverse(replace(wanted, in_order=False), MotionInverse(known.arms.drawn))
+        _warn(notes)
+        return q_rad
+
+    @cached_property
+    def _tools(self) -> "dict[bytes | None, ToolKinematics]":
+        """By the bytes of the tool's pose: what is worked out once."""
+        return {}
+
+    def _kinematics(self, tool: Floats | None) -> "ToolKinematics":
+        from calibrate.apply.correct import Arms, Options, ToolKinematics
+
+        stated = None if tool is None else np.asarray(tool, dtype=np.float64)
+        key = None if stated is None else stated.tobytes()
+        if key not in self._tools:
+            options = Options(stated)
+            self._tools[key] = ToolKinematics(Arms.of(self.file, options), options)
+        return self._tools[key]
+
     def _placed(self, q_rad: Floats, conditions: Conditions, same_session: bool, frame: Frame = "robot") -> "Placed":
         """ValueError for a frame of another name."""
         from calibrate.apply.predicting import placed
@@ -161,7 +216,7 @@ class Model:
         if frame not in get_args(Frame):
             raise ValueError(f"frame '{frame}': give one of {', '.join(get_args(Frame))}")
         q = np.atleast_2d(np.asarray(q_rad, dtype=np.float64))
-        columns = {name: np.broadcast_to(value, len(q)) for name, value in (conditions or {}).items()}
+        columns = _columns(conditions, len(q))
         joints = {f"q{i + 1}_rad": column for i, column in enumerate(q.T)}
         samples = Samples({"t_s": np.zeros(len(q))} | columns | joints, q.shape[1])
         found = placed(self.file, samples, same_session, in_world=frame == "world")
@@ -239,13 +294,11 @@ def _wanted(
     else:
         given = np.asarray(poses, dtype=np.float64)
         T = given[None] if given.ndim == 2 else given
-        turn = T[..., :3, :3]
-        if T.shape[1:] != (4, 4) or not np.allclose(turn @ np.swapaxes(turn, 1, 2), np.eye(3), atol=SAME):
+        if T.shape[1:] != (4, 4) or not _are_rigid(T).all():
             raise DataError(f"poses of shape {given.shape}: give (pose, 4, 4), each a rotation and a position in m")
         n = len(T)
         nothing = np.full((n, joints), np.nan)
-        stated = {name: np.array(np.broadcast_to(value, n), dtype=np.float64) for name, value in conditions.items()}
-        wanted = Wanted(T, nothing, nothing.copy(), stated)
+        wanted = Wanted(T, nothing, nothing.copy(), _columns(conditions, n))
     if near_rad is not None:
         near = np.asarray(near_rad, dtype=np.float64)
         if near.ndim == 2:
@@ -253,6 +306,35 @@ def _wanted(
         elif not np.isfinite(wanted.near_rad[0]).all():
             wanted.near_rad[0] = near
     return wanted
+
+
+def _are_rigid(T: Floats) -> NDArray[np.bool_]:
+    """(pose,) whether it is a right-handed rotation and a finite position."""
+    finite = np.isfinite(T).all(axis=(1, 2))
+    known = np.where(np.isfinite(T), T, 0.0)
+    turn = known[:, :3, :3]
+    square = np.max(np.abs(turn @ np.swapaxes(turn, 1, 2) - np.eye(3)), axis=(1, 2), initial=0.0) < SAME
+    last = np.all(known[:, 3] == np.array([0.0, 0.0, 0.0, 1.0]), axis=1)
+    return np.asarray(finite & square & (np.linalg.det(turn) > 0.0) & last)
+
+
+def _columns(conditions: Conditions, n: int) -> dict[str, Floats]:
+    """Each (pose,). DataError for one of another length."""
+    from calibrate.errors import DataError
+
+    out: dict[str, Floats] = {}
+    for name, value in (conditions or {}).items():
+        given = np.asarray(value, dtype=np.float64)
+        if given.shape not in ((), (1,), (n,)):
+            raise DataError(f"condition {name} of shape {given.shape}: give one value, or one for each of {n} poses")
+        out[name] = np.array(np.broadcast_to(given, n))
+    return out
+
+
+def _warn(notes: tuple[str, ...]) -> None:
+    """At the line that called `forward` or `inverse`."""
+    for note in notes:
+        warnings.warn(note, stacklevel=3)
 
 
 def model_of(found: "JudgedModel") -> Model:

@@ -10,6 +10,7 @@ import numpy as np
 from acquisition.recording import Recording
 from acquisition.recording.pose_plan import write_pose_plan
 from acquisition.recording.rig import rig_sha256
+from calibeam.results.controller_findings import controller_notes
 from calibeam.software import SOFTWARE
 from calibrate.diagnose.assess import Verdict
 from calibrate.diagnose.from_recording import Diagnosed, diagnose_samples
@@ -54,7 +55,8 @@ def diagnose_recording(
             "give the model that was identified with this rig, or none"
         )
     found, file = _diagnosed(recording, model, keep, begun)
-    return found, msgspec.structs.replace(file, next=(*file.next, *unused_columns(recording.samples)))
+    notes = (*unused_columns(recording.samples), *controller_notes(recording))
+    return found, msgspec.structs.replace(file, next=(*file.next, *notes))
 
 
 def diagnose_streams(recording: Recording) -> DiagnosisFile:

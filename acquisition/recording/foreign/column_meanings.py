@@ -20,7 +20,8 @@ from acquisition.recording.foreign.rotations import CONVENTIONS
 from acquisition.recording.foreign.sheet import Sheet
 from acquisition.recording.samples import ORIENTATION, POSITION, TARGET, joint_of, per_joint
 
-UNUSED, TIME, POSE_MATRIX, CAMERA = "unused", "t", "pose-matrix", "camera-"
+UNUSED, TIME, POSE_MATRIX = "unused", "t", "pose-matrix"
+CAMERA, CONTROLLER = "camera-", "controller-"  # whose pose it is; none: that of the instrument
 REMEDY = 'state it: --columns "A1..A6 [deg] = q, X Y Z [mm] = position"'
 
 # columns of samples.csv that stand alone: name without unit -> name, unit of SI ("" for none)
@@ -43,6 +44,20 @@ _TEMPERATURE = re.compile(r"temp_([A-Za-z0-9_]+)")
 _OWN_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 
 
+def bare_meaning(meaning: str) -> str:
+    """Without whose pose it is."""
+    return meaning.removeprefix(CAMERA).removeprefix(CONTROLLER)
+
+
+def _without_owner(column: str) -> str:
+    return column.removeprefix("camera_").removeprefix("controller_")
+
+
+def prefix_of(meaning: str) -> str:
+    """Of the columns of samples.csv: "camera_", "controller_", or none."""
+    return next((owner.replace("-", "_") for owner in (CAMERA, CONTROLLER) if meaning.startswith(owner)), "")
+
+
 @dataclass(frozen=True)
 class Group:
     """Columns that mean one thing: `columns` are places in the sheet, in the order of the meaning.
@@ -61,7 +76,7 @@ class Group:
         """Of the SI unit that is needed: "rad", "m", ...; "" for what has no unit."""
         if self.meaning in PER_JOINT:
             return PER_JOINT[self.meaning][1].strip("_")
-        bare = self.meaning.removeprefix(CAMERA)
+        bare = bare_meaning(self.meaning)
         if bare in ("position", POSE_MATRIX):
             return "m"
         if bare in CONVENTIONS:
@@ -75,7 +90,7 @@ class Group:
     @property
     def kept(self) -> bool:
         """Whether it is a column of the user's own, kept as it stands."""
-        bare = self.meaning.removeprefix(CAMERA)
+        bare = bare_meaning(self.meaning)
         known = bare in (*CONVENTIONS, "position", POSE_MATRIX) or self.meaning in (*PER_JOINT, *SINGLE)
         return not known and not _TEMPERATURE.fullmatch(self.meaning)
 
@@ -84,8 +99,8 @@ class Group:
         if self.meaning in PER_JOINT:
             of_all = per_joint(*PER_JOINT[self.meaning], n_joints)
             return tuple(of_all[joint - 1] for joint in self.joints) if self.joints else of_all
-        bare = self.meaning.removeprefix(CAMERA)
-        prefix = "camera_" if self.meaning.startswith(CAMERA) else ""
+        bare = bare_meaning(self.meaning)
+        prefix = prefix_of(self.meaning)
         if bare in CONVENTIONS:
             return tuple(prefix + name for name in ORIENTATION)
         if bare == "position":
@@ -408,7 +423,7 @@ def _check_own(group: Group) -> None:
         raise SamplesError(
             f"--columns: '{shown(group.meaning, 40)}' is no meaning of several columns; there are {several}"
         )
-    if joint_of(group.meaning) is not None or group.meaning.removeprefix("camera_") in (*POSITION, *ORIENTATION):
+    if joint_of(group.meaning) is not None or _without_owner(group.meaning) in (*POSITION, *ORIENTATION):
         raise SamplesError(
             f"--columns: '{group.meaning}' alone is no column of one's own; give all that belong together, such as "
             '"A1..A6 [deg] = q" or "X Y Z [mm] = position"'
@@ -435,7 +450,7 @@ def _of_joints(sheet: Sheet, group: Group, n_joints: int) -> Group:
 
 
 def _check_count(group: Group, n_joints: int) -> None:
-    bare = group.meaning.removeprefix(CAMERA)
+    bare = bare_meaning(group.meaning)
     wanted = {len(group.columns)} if group.meaning == UNUSED else {1}
     if group.meaning in PER_JOINT:
         wanted = {n_joints}

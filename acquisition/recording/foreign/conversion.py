@@ -20,12 +20,12 @@ from acquisition.recording.errors import RecordingError, SamplesError, shown
 from acquisition.recording.files import write_json
 from acquisition.recording.files.explain import suffix_of
 from acquisition.recording.foreign.column_meanings import (
-    CAMERA,
     POSE_MATRIX,
     TEXT,
     TIME,
     UNUSED,
     Group,
+    bare_meaning,
     understood,
     unit_in,
 )
@@ -216,7 +216,7 @@ def converted(table: Understanding, group: Group) -> Floats:
         return seconds_since(times, _base(times, group), group)[:, None]
     raw = np.stack([table.numbers[column] for column in group.columns], axis=1)
     unit = unit_of(group.unit) if group.suffix else None
-    bare = group.meaning.removeprefix(CAMERA)
+    bare = bare_meaning(group.meaning)
     if bare == POSE_MATRIX:
         return _poses(table, group, raw, unit)
     values = raw if unit is None else raw * unit.factor + unit.offset
@@ -420,7 +420,7 @@ def _fault(table: Understanding, group: Group, unit: Unit, *, settled: bool) -> 
 
 
 def _plausible(rig: Rig, group: Group) -> Plausible:
-    bare = group.meaning.removeprefix(CAMERA)
+    bare = bare_meaning(group.meaning)
     if bare in ("q", "cmd"):
         ends = [abs(end) for joint in rig.arm.joints for end in (joint.lower_rad, joint.upper_rad)]
         return Plausible(max(_PLAUSIBLE["q"].largest, *(end + 0.5 for end in ends)), _PLAUSIBLE["q"].least_spread)

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.recording.errors import RecordingError, SamplesError, shown
-from acquisition.recording.foreign.column_meanings import CAMERA, POSE_MATRIX, TIME, UNUSED, Group, clauses, name_of
+from acquisition.recording.foreign.column_meanings import POSE_MATRIX, TIME, UNUSED, Group, clauses, name_of, prefix_of
 from acquisition.recording.foreign.conversion import (
     EPOCH_S,
     Exact,
@@ -213,7 +213,7 @@ def _stream(table: Understanding, base: Exact) -> Stream:
 
 def _channels(table: Understanding, group: Group) -> Iterator[tuple[Channel, NDArray[Any]]]:
     values = converted(table, group)
-    prefix = "camera_" if group.meaning.startswith(CAMERA) else ""
+    prefix = prefix_of(group.meaning)
     if group.meaning in _JOINT_CHANNELS:
         if group.joints:
             some, values = values, np.full((len(values), table.rig.n_joints), np.nan)

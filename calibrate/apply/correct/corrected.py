@@ -158,6 +158,40 @@ def correct(
             f"{wanted.source}: {len(wanted)} poses; at most {most} are corrected at a time, split it into parts"
         )
     arms = Arms.of(model, options)
+    found = commanded(arms, wanted, inverse_of, options)
+    q_rad, nominal_rad, conditions, why = found.q_rad, found.nominal_rad, found.conditions, found.why
+    via_rad = q_rad - options.approach * options.overshoot_rad if options.approach else None
+    refuse_beyond(arms, q_rad, via_rad, why)
+    before, _, _ = predicted_errors(model, wanted, nominal_rad, conditions, options)
+    after, beyond, notes = predicted_errors(model, wanted, q_rad, conditions, options)
+    far_m = np.maximum(np.abs(wanted.T_base_tool[:, :3, 3]).max(axis=1), 0.1)
+    off_rad = before.error_rad + before.error_m / far_m  # what joints of a regular posture turn by, about
+    singular = near_singular(q_rad - nominal_rad, off_rad)
+    status, says = _stated(arms, q_rad, why, beyond, singular, options.margin_rad)
+    as_stated = np.full(wanted.T_base_tool.shape, np.nan)
+    good: Bools = np.asarray(np.isfinite(q_rad).all(axis=1))
+    as_stated[good] = arms.drawn.frames(q_rad[good])[:, -1] @ arms.stated_tool
+    if via_rad is not None:
+        via_rad = np.where(good[:, None], via_rad, np.nan)
+    if options.tool is not None:
+        notes = (*notes, *arms.of_tool(after, options.tool_name))
+    if arms.low_rad is None:
+        notes = (*notes, "the model does not hold its recorded joint range: poses beyond it are not marked")
+    return Corrected(q_rad, nominal_rad, via_rad, as_stated, before, after, status, says, notes)
+
+
+@dataclass(frozen=True, eq=False)
+class Commands:
+    """Of wanted poses: NaN and, in `why`, status and reason of the row where there is none."""
+
+    q_rad: Floats  # (pose, joint) at which the real tool is there
+    nominal_rad: Floats  # (pose, joint) that a controller with the rig file's arm commands
+    conditions: Mapping[str, Floats]  # column of samples.csv -> (pose,), with the moves that lead to the poses
+    why: dict[int, tuple[str, str]]
+
+
+def commanded(arms: "Arms", wanted: Wanted, inverse_of: Inverse, options: Options) -> Commands:
+    """Joints for every pose that can be reached; their limits are not looked at. DataError as of `correct`."""
     nominal_rad, why = _nominal(arms, wanted, inverse_of)
     reached = np.isfinite(nominal_rad).all(axis=1)
     q_rad = nominal_rad.copy()
@@ -170,24 +204,7 @@ def correct(
         q_rad[rows] = np.where(solved[:, None], found_rad, np.nan)
         for row in rows[~solved]:
             why[row] = (UNREACHABLE, "no posture of the calibrated arm puts the tool there")
-    via_rad = q_rad - options.approach * options.overshoot_rad if options.approach else None
-    _refuse_beyond(arms, q_rad, via_rad, why)
-    before, _, _ = predicted_errors(model, wanted, nominal_rad, conditions, options)
-    after, beyond, notes = predicted_errors(model, wanted, q_rad, conditions, options)
-    far_m = np.maximum(np.abs(wanted.T_base_tool[:, :3, 3]).max(axis=1), 0.1)
-    off_rad = before.error_rad + before.error_m / far_m  # what joints of a regular posture turn by, about
-    singular = _near_singular(q_rad - nominal_rad, off_rad)
-    status, says = _stated(arms, q_rad, why, beyond, singular, options.margin_rad)
-    as_stated = np.full(wanted.T_base_tool.shape, np.nan)
-    good: Bools = np.asarray(np.isfinite(q_rad).all(axis=1))
-    as_stated[good] = arms.drawn.frames(q_rad[good])[:, -1] @ arms.stated_tool
-    if via_rad is not None:
-        via_rad = np.where(good[:, None], via_rad, np.nan)
-    if options.tool is not None:
-        notes = (*notes, *arms.of_tool(after, options.tool_name))
-    if arms.low_rad is None:
-        notes = (*notes, "the model does not hold its recorded joint range: poses beyond it are not marked")
-    return Corrected(q_rad, nominal_rad, via_rad, as_stated, before, after, status, says, notes)
+    return Commands(q_rad, nominal_rad, conditions, why)
 
 
 @dataclass(frozen=True, eq=False)
@@ -345,11 +362,12 @@ def _solved(
         left = np.maximum(np.linalg.norm(off[:, :3, 3], axis=1), Rotation.from_matrix(off[:, :3, :3]).magnitude())
         better = found & (left < least)
         least[better], best_rad[better] = left[better], q_rad[better]
-        if found.all() and np.all(least < CLOSE):
+        going = ~found | (least >= CLOSE)  # the others stay, so that a pose among many ends where it does alone
+        if not going.any():
             break
         plain = arms.geometric.frames(q_rad)[:, -1]
         next_rad, solved = inverse_of.refined(arms.geometric, plain @ inverse(real) @ goal, q_rad)
-        q_rad = np.where(solved[:, None], next_rad, q_rad)
+        q_rad = np.where((solved & going)[:, None], next_rad, q_rad)
         found |= solved
     return best_rad, found & np.isfinite(least)
 
@@ -410,7 +428,7 @@ def _sides(moves: Floats) -> Floats:
     return side
 
 
-def _refuse_beyond(arms: Arms, q_rad: Floats, via_rad: Floats | None, why: dict[int, tuple[str, str]]) -> None:
+def refuse_beyond(arms: Arms, q_rad: Floats, via_rad: Floats | None, why: dict[int, tuple[str, str]]) -> None:
     """Commands beyond a limit are no commands; in place."""
     for what, table in (("", q_rad), ("overshoot point: ", via_rad)):
         if table is None:
@@ -447,7 +465,7 @@ def _stated(
     return tuple(status), tuple(says)
 
 
-def _near_singular(turned_rad: Floats, off_rad: Floats) -> list[str]:
+def near_singular(turned_rad: Floats, off_rad: Floats) -> list[str]:
     """(pose) a sentence where a joint turns far for a small correction (pose, joint); empty elsewhere."""
     most, joint = np.abs(turned_rad).max(axis=1), np.abs(turned_rad).argmax(axis=1)
     return [

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from acquisition.recording import Samples
 from acquisition.recording.rig import Arm
-from acquisition.recording.samples import joint_of, per_joint
+from acquisition.recording.samples import CONTROLLER, joint_of, per_joint
 from calibrate.model.arms.coupled_readings import by_reading, uncoupled
 from calibrate.model.effects.drivers import Conditions
 from calibrate.model.sensors.catalogue import SENSORS
@@ -19,6 +19,7 @@ SMOOTHING = 0.01  # of the samples, at least 3: thermometers are noisy, what the
 NAMED = {
     *(name for kind in SENSORS for name in (*kind.columns, *kind.further)),
     *("t_s", "target", "placement", "first_psd", "psd1_sum_v", "psd2_sum_v", "repeat"),
+    *CONTROLLER,
     *("payload_kg", "payload_com_x_m", "payload_com_y_m", "payload_com_z_m"),
 }
 

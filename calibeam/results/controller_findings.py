@@ -1,0 +1,97 @@
+"""What a recording shows of the arm that the controller computes with: one sentence, and that arm as a rig file."""
+
+from pathlib import Path
+
+import msgspec
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from acquisition.recording import Finding, Recording
+from acquisition.recording.check_recording import Problem, Severity
+from acquisition.recording.output import toml_output, write_output
+from acquisition.recording.rig import ArmModel, Rig
+from acquisition.recording.samples import CONTROLLER
+from calibeam.new_rig.drawn import rig_file_text
+from calibrate.errors import DataError
+from calibrate.fit.controller_arm import FEWEST, ControllerArm, ControllerPoses, controller_arm
+from calibrate.model.arms.convert import convert, pose_of
+from calibrate.model.rigid import transform
+from calibrate.quantities import angle, angle_with_sigma, counted, length, length_with_sigma
+
+RIG_FILE = toml_output(("schema", "arm"), "rig file")
+MOST = 8  # differences in one sentence
+
+
+def arm_of_controller(recording: Recording) -> ControllerArm | None:
+    """None where the recording holds no poses of the controller, or too few."""
+    poses = ControllerPoses.of(recording)
+    return None if poses is None or len(poses.q_rad) < FEWEST else controller_arm(recording.rig, poses)
+
+
+def controller_findings(found: ControllerArm | None) -> tuple[Finding, ...]:
+    """One where arm, base or tool of the controller are not those of the rig file."""
+    if found is None or not (found.parts or found.other_tool):
+        return ()
+    severity = Severity.WARNING if found.parts else Severity.INFORMATION
+    return (Finding(Problem.CONTROLLER_ARM, found.source, sentence(found), severity),)
+
+
+def controller_notes(recording: Recording) -> tuple[str, ...]:
+    """The same for results of a fit: only where the arm or its base differs, which `correct` has to know."""
+    return tuple(f.says for f in controller_findings(arm_of_controller(recording)) if f.severity is Severity.WARNING)
+
+
+def sentence(found: ControllerArm) -> str:
+    """What differs, with one sigma."""
+    point, turn = found.T_flange_tool[:3, 3], Rotation.from_matrix(found.T_flange_tool[:3, :3]).as_euler("xyz", True)
+    at = ", ".join(f"{1e3 * v:z.3f}" for v in point.tolist())
+    turned = ", ".join(f"{v:z.2f}" for v in turn.tolist())
+    tool = f"its tool is at {at} mm in the flange, turned by {turned}° about x, y, z"
+    left = f"{found.poses} poses agree with it to {length(found.left_m, 2)} and {angle(found.left_rad, 2)} (rms)"
+    if found.left_out:
+        left += f"; {found.left_out} outlying poses not used"
+    if not found.parts:
+        return f"the controller computes with the arm of the rig file, but with another tool: {tool}; {left}"
+    largest = sorted(found.differences, key=lambda d: -abs(d.value) / max(d.sigma, 1e-12))[:MOST]
+    named = [
+        f"{d.name} {(length_with_sigma if d.unit == 'm' else angle_with_sigma)(d.value, d.sigma)}" for d in largest
+    ]
+    more = len(found.differences) - len(named)
+    rest = f" and {more} more" if more else ""
+    unknown = f"; not determined: {counted(len(found.undetermined), 'number')}" if found.undetermined else ""
+    tools = f"; {tool}" if found.other_tool else ""
+    return (
+        f"the controller computes with another arm than the rig file: {', '.join(named)}{rest} (controller less rig "
+        f"file){unknown}{tools}; {left}; `calibeam check --controller-arm` writes it as a rig file"
+    )
+
+
+def write_controller_arm(recording: Recording, found: ControllerArm | None, path: Path) -> None:
+    """The rig file. DataError where the recording does not show that arm, OSError where it cannot be written."""
+    if found is None:
+        raise DataError(
+            f"{recording.path}: it does not show the controller's arm; record the robot with its tool poses, or give "
+            f"the columns {', '.join(CONTROLLER)} in {FEWEST} or more different poses"
+        )
+    write_output(path, controller_rig_text(recording.rig, found), RIG_FILE)
+
+
+def controller_rig_text(rig: Rig, found: ControllerArm) -> str:
+    """A rig file with the controller's arm as `local-poe`, its base included, and the point of its tool.
+
+    DataError for an arm whose reported angles are coupled.
+    """
+    if any(joint.follows is not None for joint in rig.arm.joints):
+        raise DataError(f"rig {rig.name}: its angles are coupled (`follows`), the controller's arm is not written")
+    arm = convert(rig.arm, ArmModel.LOCAL_POE, found.theta).arm
+    first = arm.joints[0]
+    base = found.T_base @ transform(first.origin_m or np.zeros(3), first.rotation_rad or np.zeros(3))
+    pose = pose_of(base)
+    joints = (msgspec.structs.replace(first, origin_m=pose.origin_m, rotation_rad=pose.rotation_rad), *arm.joints[1:])
+    notes = (
+        f"The arm that the controller of {rig.name} computes with, from {found.poses} poses of {found.source}",
+        *(f"{d.name}: {d.value!r} {d.unit} more than in the rig file, sigma {d.sigma:.2g}" for d in found.differences),
+        *(f"not determined: {why}" for why in found.undetermined),
+    )
+    point = [float(v) for v in found.T_flange_tool[:3, 3]]
+    return rig_file_text(f"{rig.name}-controller", "local-poe", joints, arm.flange, notes, point)

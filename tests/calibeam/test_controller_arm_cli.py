@@ -1,0 +1,124 @@
+"""`check` names the arm that a controller computes with, where it is not that of the rig file, and writes it."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from acquisition.recording import Channel, RecordingWriter, read
+from acquisition.recording.rig import load_rig, rig_text
+from calibeam.cli import run
+from calibeam.results.controller_findings import controller_notes
+from calibrate.model.arms.rig_arm import RigArm
+from simulators.ur.controller_kinematics import Link, NominalArm, frame_of, pose_of
+
+RIG = Path(__file__).parents[2] / "rigs" / "ur5e-dual-psd.toml"
+TOOL = (0.0, 0.0, 0.12, 0.0, 0.0, 0.3)
+NONE = (0.0,) * 6
+LENGTHENED_M = 5e-4
+
+
+class Standing:
+    def now_s(self) -> float:
+        return 1000.0
+
+
+def controller(lengthened_m=0.0):
+    """As the emulated controller computes; link 2 longer than in the rig file."""
+    joints = load_rig(RIG).arm.joints
+    rows = [Link(j.a_m or 0.0, j.alpha_rad or 0.0, j.d_m or 0.0, j.theta_offset_rad or 0.0) for j in joints]
+    rows[1] = Link(rows[1].a_m + lengthened_m, *(rows[1].alpha_rad, rows[1].d_m, rows[1].theta_offset_rad))
+    return NominalArm(rows)
+
+
+@pytest.fixture
+def recorded(tmp_path):
+    """A robot's stream as the RTDE driver declares it, along a path through the room."""
+
+    def made(arm, tool=NONE, samples=1500):
+        t = np.linspace(0.0, 1.0, samples)[:, None]
+        q = np.sin(2.0 * np.pi * t * np.array([1.0, 2.0, 3.0, 5.0, 7.0, 11.0]) + np.arange(6)) - [0, 1, 0, 1, 0, 0]
+        poses = np.array([pose_of(arm.tool(row.tolist(), frame_of(tool))) for row in q])
+        channels = (
+            Channel("actual_q_rad", "rad", (6,)),
+            Channel("actual_tcp_pose_m_rad", "m, rad", (6,)),
+            Channel("tcp_offset_m_rad", "m, rad", (6,)),
+        )
+        path, number = tmp_path / "recording.mcap", np.arange(samples)
+        with RecordingWriter(
+            path, rig_text=rig_text(RIG), software="test", clock=Standing(), notes={"segment": "1"}
+        ) as writer:
+            values = {
+                "actual_q_rad": q,
+                "actual_tcp_pose_m_rad": poses,
+                "tcp_offset_m_rad": np.tile(tool, (samples, 1)),
+            }
+            writer.stream("robot", channels).append(1000.0 + number * 2e-3, number * 2e-3, number, values)
+        return path, q
+
+    return made
+
+
+def findings(path, capsys, *more):
+    assert run(["check", str(path), "--json", *more]) == 0
+    return [f for f in json.loads(capsys.readouterr().out)["findings"] if f["problem"] == "controller-arm"]
+
+
+def test_the_same_arm_is_not_reported(recorded, capsys):
+    assert findings(recorded(controller())[0], capsys) == []
+
+
+def test_another_tool_is_information(recorded, capsys):
+    path, _ = recorded(controller(), TOOL)
+    (found,) = findings(path, capsys)
+    assert found["severity"] == "information"
+    assert "the arm of the rig file, but with another tool: its tool is at 0.000, 0.000, 120.000 mm" in found["says"]
+    assert controller_notes(read(path)) == ()
+
+
+def test_another_arm_is_named_and_written(recorded, tmp_path, capsys):
+    path, q = recorded(controller(LENGTHENED_M), TOOL)
+    (found,) = findings(path, capsys, "--controller-arm", str(tmp_path / "arm.toml"))
+    assert found["severity"] == "warning"
+    assert "another arm than the rig file: link2.length 500.0" in found["says"]
+    assert controller_notes(read(path)) == (found["says"],)
+    written = RigArm.of_rig(load_rig(tmp_path / "arm.toml"))
+    other = np.random.default_rng(1).uniform(-2.5, 2.5, (20, 6))
+    true = [controller(LENGTHENED_M).tool(row.tolist(), frame_of(TOOL))[9:] for row in other]
+    assert np.abs(written.tip_m(other) - true).max() < 1e-8
+    assert np.abs(RigArm.of_rig(load_rig(RIG)).frames(q)[:, -1] - written.frames(q)[:, -1]).max() > 1e-4
+
+
+def test_a_recording_without_its_poses_is_refused(recorded, tmp_path, capsys):
+    path, _ = recorded(controller(), samples=10)
+    assert run(["check", str(path), "--controller-arm", str(tmp_path / "arm.toml")]) == 1
+    assert "does not show the controller's arm" in capsys.readouterr().err
+    assert run(["check", str(RIG), "--controller-arm", str(tmp_path / "arm.toml")]) == 1
+    assert "is a rig file; give a recording" in capsys.readouterr().err
+    assert not (tmp_path / "arm.toml").exists()
+
+
+def test_columns_of_a_table_are_imported_and_are_no_cause_of_errors(tmp_path):
+    """KUKA: degrees and millimetres; A, B, C about z, y', x''."""
+    from calibrate.model.effects.conditions import conditions_of
+
+    rng = np.random.default_rng(2)
+    q = rng.uniform(-1.5, 1.5, (40, 6))
+    poses = np.array([controller().tool(row.tolist(), frame_of(NONE)) for row in q])
+    R = poses[:, :9].reshape(-1, 3, 3).swapaxes(1, 2)
+    a, c = np.arctan2(R[:, 1, 0], R[:, 0, 0]), np.arctan2(R[:, 2, 1], R[:, 2, 2])
+    abc = np.degrees(np.stack([a, np.arcsin(-R[:, 2, 0]), c], axis=1))
+    table = np.concatenate([np.degrees(q), 1e3 * poses[:, 9:], abc, 1e3 * poses[:, 9:]], axis=1)
+    heads = [*(f"A{j}" for j in range(1, 7)), "X", "Y", "Z", "A", "B", "C", "TX", "TY", "TZ"]
+    np.savetxt(tmp_path / "kuka.csv", table, delimiter=",", header=",".join(heads), comments="", fmt="%.9f")
+    stated = (
+        "A1..A6 [deg] = q, X Y Z [mm] = controller-position, A B C [deg] = controller-abc, TX TY TZ [mm] = position"
+    )
+    (tmp_path / "rig.toml").write_text(rig_text(Path(str(RIG).replace("dual-psd", "tracker"))), encoding="utf-8")
+    rig, out = str(tmp_path / "rig.toml"), str(tmp_path / "session")
+    assert run(["import", str(tmp_path / "kuka.csv"), "--rig", rig, "--out", out, "--columns", stated, "--yes"]) == 0
+    samples = read(tmp_path / "session").samples
+    assert not any(name.startswith("controller") for name in conditions_of(samples, {}).extra)
+    assert np.allclose(samples.column("controller_x_m"), poses[:, 9], atol=1e-9)
+    assert controller_notes(read(tmp_path / "session")) == ()
