@@ -203,7 +203,7 @@ def figures() -> tuple[Figure, ...]:
 
 TODAY = {
     "files": 759,
-    "code": 80_470,
+    "code": 80_490,
     "longest_function": 53,
     "one_importer": 2,
     "classes": 0,
