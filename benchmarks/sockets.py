@@ -19,7 +19,9 @@ from calibeam.new_rig.drawn import poe_text
 from calibeam.new_rig.from_urdf import urdf_arm
 from calibeam.results.identification import identify_session, session_model
 from calibrate.apply.predicting import predict_with_physics
+from calibrate.model.arms.catalogue import arm_of
 from calibrate.model.model_file import ModelFile
+from calibrate.model.parameters import start_values
 from calibrate.model.sensors.seat import TIP
 
 APART_M, SIGMA_M = 0.05, 0.03e-3  # of the two sockets: as drawn, and what a caliper resolves (DIN 862: 0.03 mm)
@@ -76,6 +78,13 @@ def pairs_at(tip_m: Floats, seat: NDArray[np.int64]) -> Mapping[int, Pair]:
     }
 
 
+def nominal_pairs(recording: Recording) -> Mapping[int, Pair]:
+    """Of every place by the arm and the ball as drawn: the ball is the end of the arm."""
+    arm = arm_of(recording.rig)
+    tip_m = arm.flange(start_values(arm.parameters), recording.samples.joints())[:, :3, 3]
+    return pairs_at(tip_m, recording.samples.integers(SEAT, 0))
+
+
 def left_out(recording: Recording) -> Iterator[Pair]:
     """Each place in turn by the model of all the others."""
     for place in range(int(recording.samples.integers(SEAT, 0).max()) // 2):
@@ -93,6 +102,7 @@ def lines(folder: Path) -> Iterator[str]:
         recording = session_of(folder, Path(work) / "session")
         yield HEAD
         yield "|" + "---|" * (HEAD.count("|") - 1)
+        yield _line("nominal arm", list(nominal_pairs(recording).values()))
         found: list[Pair] = []
         for name, pair in zip(names, left_out(recording), strict=True):
             found.append(pair)

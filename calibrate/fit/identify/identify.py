@@ -21,7 +21,7 @@ from calibrate.fit.fit_plan import DEFAULT, FitPlan, MethodName
 from calibrate.fit.gross_errors.bad_rows import duplicated_rows, left_alone, rows_beyond_limits
 from calibrate.fit.gross_errors.conventions import wrong_convention, wrong_table
 from calibrate.fit.gross_errors.joint_hypotheses import as_radians, beyond_limits
-from calibrate.fit.identify.clean import clean, mirrored_axes, refuse_most, rows_of
+from calibrate.fit.identify.clean import clean, mirrored_axes, refuse_most, rows_of, wrong_distances
 from calibrate.fit.identify.evidence import EvidenceOptions, Splitting
 from calibrate.fit.identify.fit_report import result_of
 from calibrate.fit.identify.point_constraint import point_constraints
@@ -121,7 +121,7 @@ def _refuse_positions(instruments: Instruments) -> None:
 
 
 def wrong_file(rig: Rig, samples: Samples) -> tuple[GrossError, ...]:
-    """Conventions of the whole file that are not those of the rig."""
+    """Conventions of the whole file that are not those of the rig, and lengths of the rig that the file contradicts."""
     q_rad, limits_rad = samples.joints(), _limits_rad(rig)
     in_degrees = beyond_limits(q_rad, limits_rad)
     if in_degrees is not None:
@@ -130,7 +130,8 @@ def wrong_file(rig: Rig, samples: Samples) -> tuple[GrossError, ...]:
     found = _wrong_table(rig, witnesses) or wrong_convention(_drawn_flange(rig), witnesses)
     if in_degrees is None and found is None:
         found = mirrored_axes(rig, samples)
-    return tuple(gross_error for gross_error in (in_degrees, found) if gross_error is not None)
+    wrong = tuple(gross_error for gross_error in (in_degrees, found) if gross_error is not None)
+    return wrong or wrong_distances(rig, samples)
 
 
 def _wrong_table(rig: Rig, witnesses: Sequence[Witness]) -> GrossError | None:

@@ -43,6 +43,7 @@ class GrossErrorKind(Enum):
     BEYOND_LIMITS = "joint angle beyond its limits"
     DUPLICATED_ROWS = "duplicated rows"
     LEFT_ALONE = "row without its partner"
+    WRONG_DISTANCE = "known distance that the readings contradict"
     OTHER_SESSION = "rows of another session"
     WRONG_VALUE = "wrong value"
     BAD_SHOT = "bad shot"

@@ -46,7 +46,11 @@ class KnownDistances:
         return 2.0 * float(np.sum(np.log(self.sigma_m)))
 
     def residual(self, theta: Floats) -> Floats:
-        return (np.linalg.norm(self._span(theta), axis=1) - self.length_m) / self.sigma_m
+        return (self.spans_m(theta) - self.length_m) / self.sigma_m
+
+    def spans_m(self, theta: Floats) -> Floats:
+        """(row,) distances for values (param,)."""
+        return np.linalg.norm(self._span(theta), axis=1)
 
     def jacobian(self, theta: Floats) -> Floats:
         span = self._span(theta)
