@@ -1,6 +1,7 @@
 """`calibeam check`: every device of a rig, or what is in a recording or a folder of log segments, and what is wrong."""
 
 import json
+from collections.abc import Iterator
 from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated, Any
@@ -17,13 +18,19 @@ from acquisition.recording.samples import Floats
 from calibeam.console import Console
 from calibeam.devices.check import check_devices
 from calibeam.outcome import CheckFailed
+<<<<<<< HEAD
 from calibeam.overwriting import writes
 from calibeam.results.controller_findings import RIG_FILE, arm_of_controller, controller_findings, write_controller_arm
 from calibrate.errors import DataError
+=======
+from calibrate.diagnose.streams import devices_of, examine_encoders
+from calibrate.quantities import angle, angle_with_sigma
+>>>>>>> 55cd374bdec498400625403f5df783a2bfd8ab65
 from drivers.clock import SystemClock
 
 SAME_S = 1.0  # longer than any driver keeps a sample
 EMULATED = 0.01  # of the rate: no clock of a device runs so far off; emulators run at another pace than real time
+CLEAR = 5.0  # sigmas of an eccentricity that is reported
 MOST_LINES = 20  # findings of one file printed one by one; a script gets all of them with --json
 
 
@@ -52,6 +59,7 @@ def lines(recording: Recording, findings: tuple[Finding, ...]) -> list[str]:
     """For a person: the file, each stream with its rate and clock, each finding."""
     reported = [f"{recording.path}: settled samples: {len(recording.samples)}, events: {len(recording.events)}"]
     reported += [f"  {stream.name}: {_rate(stream)}; {_clock(stream)}" for stream in recording.streams.values()]
+    reported += [f"  encoders: {line}" for line in encoder_lines(recording)]
     reported += [f"  {f.severity.value}: {f.problem.value}: {f.where}: {f.says}" for f in findings[:MOST_LINES]]
     if len(findings) > MOST_LINES:
         reported.append(f"  and {len(findings) - MOST_LINES} more findings; --json prints all")
@@ -60,6 +68,35 @@ def lines(recording: Recording, findings: tuple[Finding, ...]) -> list[str]:
         return [*reported, "  not fit for use: errors above"]
     warned = any(f.severity.value == "warning" for f in findings)
     return [*reported, "  no errors; see the warnings above" if warned else "  no errors"]
+
+
+def encoder_lines(recording: Recording) -> Iterator[str]:
+    """Of a log of encoders alone: pace, and each encoder against the first."""
+    device = devices_of(recording).get("encoders") if recording.rig.n_joints == 0 else None
+    if device is None:
+        return
+    pace, pairs = examine_encoders(device)
+    if pace is not None:
+        yield (
+            f"period {_ms(pace.period_s)}, jitter {1e6 * pace.jitter_s:.0f} µs (1 sigma), "
+            f"longest time between two rows {_ms(pace.longest_s)}"
+        )
+    mute = np.isnan(device.track.values).sum(axis=0)
+    yield from (f"encoder {k + 1}: no answer in {n} rows" for k, n in enumerate(mute) if n)
+    for pair in pairs:
+        against = f"encoder {pair.number} against encoder 1"
+        noise = "" if pair.noise_rad is None else f"noise of a reading {angle(pair.noise_rad, 2)}; "
+        once = pair.once_rad
+        if once is not None and once.value > CLEAR * once.sigma:
+            yield f"{against}: {noise}eccentricity {angle_with_sigma(once.value, once.sigma)}, once a turn"
+        elif once is not None:
+            yield f"{against}: {noise}no eccentricity found, detection limit {angle(CLEAR * once.sigma, 2)}"
+        if pair.why:
+            yield f"{against}: {noise}not determined: {pair.why}"
+        for slip in pair.slips:
+            at_s = slip.from_s - recording.host_s0, slip.to_s - recording.host_s0
+            size = angle_with_sigma(slip.size_rad, slip.sigma_rad)
+            yield f"{against}: slip of {size} between {at_s[0]:.2f} and {at_s[1]:.2f} s"
 
 
 def _rate(stream: Stream) -> str:
@@ -107,6 +144,7 @@ def _as_json(recording: Recording, findings: tuple[Finding, ...]) -> dict[str, A
             stream.name: {"samples": stream.host_s.size, "gaps": len(stream.gaps), "clock": _model(clock_model(stream))}
             for stream in recording.streams.values()
         },
+        "encoders": list(encoder_lines(recording)),
         "findings": [
             {"severity": f.severity.value, "problem": f.problem.value, "where": f.where, "says": f.says}
             for f in findings

@@ -1,6 +1,7 @@
 """Clocks, gaps, late channels, ringing and slips in recorded streams, without any model of the arm."""
 
 from calibrate.diagnose.streams.clock import ClockFit, ClockStatus, clock_between
+from calibrate.diagnose.streams.encoder_pairs import examine_encoders
 from calibrate.diagnose.streams.examine import StreamReport
 from calibrate.diagnose.streams.recorded import StreamDevice, devices_of
 from calibrate.diagnose.streams.stream_findings import StreamFinding
@@ -18,6 +19,7 @@ __all__ = [
     "TrackCurve",
     "clock_between",
     "devices_of",
+    "examine_encoders",
     "sample_windows",
     "streams_of",
     "white_noise",

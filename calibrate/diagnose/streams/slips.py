@@ -139,15 +139,20 @@ def _of_joint(joint: int, pieces: Floats, joints: int, innocent: Sequence[Floats
     if n >= limits.SLIP_SPARE_STANDS + 6:
         level.append((t - t.mean()) / max(float(np.ptp(t)), 1e-12))
     level += innocent[: max(0, n - limits.SLIP_SPARE_STANDS - 4 - len(level))]
+    return steps_in(joint, pieces, level, d, n * joints)
+
+
+def steps_in(joint: int, pieces: Floats, level: list[Floats], d: Floats, tests: int) -> list[Slip]:
+    """Steps of `d` (piece,) beyond the columns of `level`, largest first. `pieces` (piece, 2 or more): begin, end."""
     places: list[int] = []
     out: dict[int, Slip] = {}
     while len(places) < limits.MOST_SLIPS:
-        base = np.stack([*level, *((np.arange(n) >= k).astype(float) for k in places)], axis=1)
-        best = _best(base, d, n * joints)
+        base = np.stack([*level, *((np.arange(len(d)) >= k).astype(float) for k in places)], axis=1)
+        best = _best(base, d, tests)
         if best is None or best[0] in places:
             break
         places.append(best[0])
-        out = _sized(joint, pieces, level, d, places, n * joints)
+        out = _sized(joint, pieces, level, d, places, tests)
     return list(out.values())
 
 
