@@ -13,12 +13,13 @@ from acquisition.recording.rig import ArmModel, Rig
 from acquisition.recording.samples import CONTROLLER
 from calibeam.new_rig.drawn import rig_file_text
 from calibrate.errors import DataError
-from calibrate.fit.controller_arm import FEWEST, ControllerArm, ControllerPoses, controller_arm
+from calibrate.fit.controller_arm import FEWEST, ROUNDING, ControllerArm, ControllerPoses, controller_arm
 from calibrate.model.arms.convert import convert, pose_of
 from calibrate.model.rigid import transform
 from calibrate.quantities import angle, angle_with_sigma, counted, length, length_with_sigma
 
 RIG_FILE = toml_output(("schema", "arm"), "rig file")
+UNRELATED_M = 1e-3  # no arm leaves as much; angles and poses of other times do
 MOST = 8  # differences in one sentence
 
 
@@ -30,10 +31,19 @@ def arm_of_controller(recording: Recording) -> ControllerArm | None:
 
 def controller_findings(found: ControllerArm | None) -> tuple[Finding, ...]:
     """One where arm, base or tool of the controller are not those of the rig file."""
+    if found is not None and found.left_m > UNRELATED_M:
+        return (Finding(Problem.CONTROLLER_ARM, found.source, _unrelated(found), Severity.INFORMATION),)
     if found is None or not (found.parts or found.other_tool):
         return ()
     severity = Severity.WARNING if found.parts else Severity.INFORMATION
     return (Finding(Problem.CONTROLLER_ARM, found.source, sentence(found), severity),)
+
+
+def _unrelated(found: ControllerArm) -> str:
+    return (
+        f"the controller's poses do not belong to the joint angles beside them: {length(found.left_m, 2)} (rms) are "
+        "left with any arm; record both at the same time, in the units stated"
+    )
 
 
 def controller_notes(recording: Recording) -> tuple[str, ...]:
@@ -47,7 +57,8 @@ def sentence(found: ControllerArm) -> str:
     at = ", ".join(f"{1e3 * v:z.3f}" for v in point.tolist())
     turned = ", ".join(f"{v:z.2f}" for v in turn.tolist())
     tool = f"its tool is at {at} mm in the flange, turned by {turned}° about x, y, z"
-    left = f"{found.poses} poses agree with it to {length(found.left_m, 2)} and {angle(found.left_rad, 2)} (rms)"
+    m, rad = (max(value, ROUNDING) for value in (found.left_m, found.left_rad))
+    left = f"{found.poses} poses agree with it to {length(m, 2)} and {angle(rad, 2)} (rms)"
     if found.left_out:
         left += f"; {found.left_out} outlying poses not used"
     if not found.parts:
@@ -73,6 +84,8 @@ def write_controller_arm(recording: Recording, found: ControllerArm | None, path
             f"{recording.path}: it does not show the controller's arm; record the robot with its tool poses, or give "
             f"the columns {', '.join(CONTROLLER)} in {FEWEST} or more different poses"
         )
+    if found.left_m > UNRELATED_M:
+        raise DataError(f"{recording.path}: {_unrelated(found)}")
     write_output(path, controller_rig_text(recording.rig, found), RIG_FILE)
 
 

@@ -35,6 +35,7 @@ ROUNDING = 1e-9  # m and rad: a controller computes in double precision
 LEVEL = 1e-3  # of a false alarm, for a choice of parts and for a number
 STEPS = 30
 FOLDS = 5
+FARTHEST = 1e3  # m and rad: no pose of an arm, nor is what is no number
 OUTLYING = 6.0  # sigma (of the median): a pose that was written at another time than its angles
 AXES = ("x", "y", "z", "rx", "ry", "rz")
 SAME_M = 1e-6  # of a tool's point: rounded in a table
@@ -58,14 +59,16 @@ class ControllerPoses:
             if TCP in stream.values and JOINTS in stream.values and stream.host_s.size:
                 q, pose = (np.asarray(stream.values[c], dtype=np.float64) for c in (JOINTS, TCP))
                 offset = np.asarray(stream.values[OFFSET], dtype=np.float64) if OFFSET in stream.values else None
-                rows = _moved(q, np.asarray(np.all(np.isfinite(np.concatenate([q, pose], axis=1)), axis=1)))
+                if q.shape[1:] != (recording.rig.n_joints,):
+                    continue  # the robot of another rig
+                rows = _moved(q, np.asarray(np.all(np.abs(np.concatenate([q, pose], axis=1)) < FARTHEST, axis=1)))
                 tool = None if offset is None else _transforms(offset[rows])
                 return cls(q[rows], _transforms(pose[rows]), tool, f"stream {stream.name}")
         samples = recording.samples
         if not all(name in samples.columns for name in CONTROLLER) or not len(samples):
             return None
         pose = np.stack([np.asarray(samples.columns[c], dtype=np.float64) for c in CONTROLLER], axis=1)
-        known = np.isfinite(pose).all(axis=1)
+        known = np.asarray(np.all(np.abs(pose) < FARTHEST, axis=1))
         if not known.any():
             return None
         rows = np.flatnonzero(known)[np.unique(np.linspace(0, int(known.sum()) - 1, MOST).astype(int))]

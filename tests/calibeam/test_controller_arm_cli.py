@@ -90,6 +90,17 @@ def test_another_arm_is_named_and_written(recorded, tmp_path, capsys):
     assert np.abs(RigArm.of_rig(load_rig(RIG)).frames(q)[:, -1] - written.frames(q)[:, -1]).max() > 1e-4
 
 
+def test_poses_of_other_angles_show_no_arm(recorded, tmp_path, capsys, monkeypatch):
+    arm = controller()
+    monkeypatch.setattr(arm, "tool", lambda q, tool: NominalArm.tool(arm, q[::-1], tool))
+    path, _ = recorded(arm)
+    (found,) = findings(path, capsys)
+    assert found["severity"] == "information"
+    assert "do not belong to the joint angles beside them" in found["says"]
+    assert run(["check", str(path), "--controller-arm", str(tmp_path / "arm.toml")]) == 1
+    assert not (tmp_path / "arm.toml").exists()
+
+
 def test_a_recording_without_its_poses_is_refused(recorded, tmp_path, capsys):
     path, _ = recorded(controller(), samples=10)
     assert run(["check", str(path), "--controller-arm", str(tmp_path / "arm.toml")]) == 1
