@@ -202,8 +202,8 @@ def figures() -> tuple[Figure, ...]:
 
 
 TODAY = {
-    "files": 770,
-    "code": 82_000,
+    "files": 766,
+    "code": 81_620,
     "longest_function": 53,
     "one_importer": 2,
     "classes": 0,

@@ -18,14 +18,11 @@ from acquisition.recording.samples import Floats
 from calibeam.console import Console
 from calibeam.devices.check import check_devices
 from calibeam.outcome import CheckFailed
-<<<<<<< HEAD
 from calibeam.overwriting import writes
 from calibeam.results.controller_findings import RIG_FILE, arm_of_controller, controller_findings, write_controller_arm
-from calibrate.errors import DataError
-=======
 from calibrate.diagnose.streams import devices_of, examine_encoders
+from calibrate.errors import DataError
 from calibrate.quantities import angle, angle_with_sigma
->>>>>>> 55cd374bdec498400625403f5df783a2bfd8ab65
 from drivers.clock import SystemClock
 
 SAME_S = 1.0  # longer than any driver keeps a sample
