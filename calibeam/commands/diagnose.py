@@ -17,7 +17,6 @@ from calibrate.diagnose.record.file import DIAGNOSIS, write_diagnosis
 from calibrate.diagnose.record.schema import DiagnosisFile
 from calibrate.diagnose.with_model import model_of_diagnosis
 from calibrate.model.model_file import MODEL, ModelFile, read_model, write_model
-from calibrate.report.diagnosis import write_diagnosis_report
 from calibrate.report.elements.html import page_output
 
 
@@ -84,6 +83,8 @@ def diagnose_command(
         modelled = "" if model_out is None else _write_model(model_out, model_of_diagnosis(found, source), file)
         planned = "" if plan_out is None else plan_next(found, plan_out)
     reported = msgspec.structs.replace(file, next=(*file.next, planned)) if planned else file
+    from calibrate.report.diagnosis import write_diagnosis_report  # draws: nothing of it is needed in a search
+
     page = write_diagnosis_report(out.with_suffix(".html") if report is None else report, source, reported)
     said = Console(stderr=True) if json else console  # nobody takes a model that was kept for a new one
     for line in filter(None, (planned, f"diagnosis: {out}", modelled, f"report: {page}")):

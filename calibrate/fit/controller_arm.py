@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
-from scipy.stats import norm
+from scipy.special import ndtri
 
 from acquisition.recording import Recording
 from acquisition.recording.rig import Rig
@@ -266,7 +266,7 @@ def _better(rich: Floats, plain: Floats) -> bool:
     A pose counts once: what moves its six numbers together, as a pose that is read late, is no evidence six times.
     """
     gain = plain - rich
-    return float(np.mean(gain)) > float(norm.isf(LEVEL) * np.std(gain) / np.sqrt(len(gain))) > 0.0
+    return float(np.mean(gain)) > float(-ndtri(LEVEL) * np.std(gain) / np.sqrt(len(gain))) > 0.0
 
 
 def _choices(*, with_tool: bool) -> list[tuple[str, ...]]:
@@ -296,7 +296,7 @@ def _stated(rig: Rig, fit: _Fit, at: _State, parts: tuple[str, ...], left_out: i
     differences, undetermined = list[ArmDifference](), list[str]()
     if columns:
         seen = analyse(fit.jacobian(at, parts).reshape(-1, len(columns)), columns)
-        limit = float(norm.isf(0.5 * LEVEL / len(columns)))
+        limit = float(-ndtri(0.5 * LEVEL / len(columns)))
         sigmas = np.maximum(seen.sigma, fit.sigmas(at, parts))
         for p, sigma in zip(columns, sigmas.tolist(), strict=True):
             if p.name.startswith("tool."):

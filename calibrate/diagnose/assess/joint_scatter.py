@@ -92,7 +92,7 @@ def _unequal(raw: Floats, joints: Floats, best: _Trial) -> _Trial:
                 if np.ptp(moved) > limits.UNEQUAL_STEPS:
                     continue
                 unequal = replace(best, sizes=limits.UNEQUAL_JOINTS ** (moved / limits.UNEQUAL_STEPS))
-                trial = _judged(unequal.seen(raw, joints), unequal)
+                trial = _judged_by_form(raw, joints, unequal)
                 if trial.two_log_likelihood > best.two_log_likelihood:
                     best, steps = trial, moved
         if best is last:
@@ -100,12 +100,28 @@ def _unequal(raw: Floats, joints: Floats, best: _Trial) -> _Trial:
     return best
 
 
+def _judged_by_form(raw: Floats, joints: Floats, trial: _Trial) -> _Trial:
+    """`_judged` at one loudness: without eigenvectors in a fifth of the time."""
+    y = raw @ trial.by.T
+    form = np.eye(y.shape[1]) + trial.loud * _form((trial.sizes[:, None, None] * joints) @ trial.by.T)
+    scale = float(np.mean(y * np.linalg.solve(form, y[:, :, None])[:, :, 0]))
+    width = float(np.sum(np.log(np.linalg.det(form))))
+    value = 2.0 * len(y) * _log_det(trial.by) - width - y.size * (np.log(scale) + 1.0)
+    return replace(trial, scale=scale, two_log_likelihood=value)
+
+
 def spectrum(felt: Floats) -> tuple[Floats, Floats]:
     """Eigenvalues (observation, k), mean trace k, and vectors of the scatter by levers (lever, observation, k)."""
-    form = np.einsum("lok,lom->okm", felt, felt)
-    size = float(np.mean(np.trace(form, axis1=1, axis2=2))) / felt.shape[2]
-    w, V = np.linalg.eigh(form / max(size, 1e-300))
+    w, V = np.linalg.eigh(_form(felt))
     return np.maximum(w, 0.0), V
+
+
+def _form(felt: Floats) -> Floats:
+    """(observation, k, k) scatter by levers (lever, observation, k), of mean trace k."""
+    levers = felt.transpose(1, 2, 0)
+    form = levers @ np.swapaxes(levers, 1, 2)
+    size = float(np.mean(np.trace(form, axis1=1, axis2=2))) / felt.shape[2]
+    return np.asarray(form / max(size, 1e-300))
 
 
 def _forms(raw: Floats) -> list[Floats]:

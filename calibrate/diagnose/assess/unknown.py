@@ -197,7 +197,10 @@ def _best_name(at: Search) -> float:
 
 def _not_accepted(accepted: Sequence[Term]) -> Allowed:
     """What is not one more function of the same drivers at the same place: two of those balance each other."""
-    return lambda term: not any(_balance(term, other) for other in accepted)
+    there: dict[str, list[Term]] = {}
+    for other in accepted:
+        there.setdefault(other.port.where, []).append(other)
+    return lambda term: not any(_balance(term, other) for other in there.get(term.port.where, ()))
 
 
 def _balance(new: Term, other: Term) -> bool:

@@ -117,9 +117,7 @@ def gains_of(menu: Menu, left: Floats) -> Floats:
     rss, gains = np.sum(left**2, axis=0), np.full((len(menu.entries), left.shape[1]), -np.inf)
     for block in menu.blocks:
         turn = turned_out(block)
-        count, k, rows = block.raw.shape
-        along = (block.raw.reshape(-1, rows) @ left).reshape(count, k, -1)
-        squares = np.sum((turn @ along) ** 2, axis=1)
+        squares = np.sum((turn @ block.products(left)) ** 2, axis=1)
         rank = np.sum(np.any(turn != 0.0, axis=2), axis=1)
         gain = bic_gain(squares, rss, (rank + menu.numbers[block.entries])[:, None], menu.sight.data)
         gains[block.entries] = np.where(rank[:, None] > 0, gain, -np.inf)

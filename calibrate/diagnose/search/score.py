@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from calibrate.diagnose import limits
 from calibrate.diagnose.state.linearised import State
-from calibrate.diagnose.state.visible import EntryBlock, Menu, Sight
+from calibrate.diagnose.state.visible import EntryBlock, Menu, Sight, inverse_of
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
@@ -132,7 +132,8 @@ def directions(menu: Menu, entry: int) -> Floats:
     """(rank, row) orthonormal rows of one entry behind geometry."""
     one = _alone(menu, entry)
     turn = turned_out(one)[0]
-    return turn[np.any(turn != 0.0, axis=1)] @ menu.sight.complement(one.raw[0])
+    unit = one.raw[0] * inverse_of(one.size[0])[:, None]
+    return turn[np.any(turn != 0.0, axis=1)] @ menu.sight.complement(unit)
 
 
 def _alone(menu: Menu, entry: int) -> EntryBlock:

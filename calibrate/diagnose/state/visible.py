@@ -5,7 +5,7 @@ Plumlee, Bayesian calibration of inexact computer models, J. Am. Stat. Assoc. 11
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TypeVar
 
@@ -70,17 +70,28 @@ class Entry:
 
 @dataclass(frozen=True)
 class EntryBlock:
-    """Entries with the same number of coefficients; columns have unit length before geometry is taken out.
+    """Entries with the same number of coefficients; columns count at unit length before geometry is taken out.
 
-    Columns on the complement are not kept: products with them follow from what geometry absorbs.
+    Neither columns of unit length nor those on the complement are kept: products with them follow from the length, and
+    from what geometry absorbs.
     """
 
     entries: Ints  # (entry,) index in the menu
     size: Floats  # (entry, k) length of the whitened columns
-    raw: Floats  # (entry, k, row)
+    raw: Floats  # (entry, k, row) whitened columns, at their own length
     absorbed: Floats  # (entry, k, rank) coordinates in the basis of what is fitted
     along: Floats  # (entry, k) products with the residual
     gram: Floats  # (entry, k, k) on the complement; the diagonal is the visible share
+
+    def products(self, columns: Floats) -> Floats:
+        """(entry, k, m) of the columns at unit length with others (row, m)."""
+        found = (self.raw.reshape(-1, self.raw.shape[2]) @ columns).reshape(*self.size.shape, -1)
+        return np.asarray(found * inverse_of(self.size)[:, :, None])
+
+
+def inverse_of(size: Floats) -> Floats:
+    """1 where there is nothing."""
+    return np.asarray(1.0 / np.where(size > 0.0, size, 1.0))
 
 
 @dataclass(frozen=True)
@@ -158,21 +169,22 @@ def grid_of(term: Term) -> list[Floats]:
 def _block(chosen: Ints, columns: list[Floats], sight: Sight) -> EntryBlock:
     """Takes its columns out of the list: all candidates at once are most of what a diagnosis holds."""
     raw, at = np.empty((len(chosen), columns[0].shape[1], len(sight.residual))), 0
-    size = np.empty(raw.shape[:2])
     while columns:
         part = columns.pop(0)
-        mine = slice(at, at := at + len(part))
-        size[mine] = np.sqrt(np.einsum("ekr,ekr->ek", part, part))  # without a copy of them all
-        np.divide(part, np.where(size[mine] > 0.0, size[mine], 1.0)[:, :, None], out=raw[mine])
-    products = (raw.reshape(-1, raw.shape[2]) @ np.column_stack([sight.basis, sight.residual])).reshape(*size.shape, -1)
+        raw[at : at + len(part)] = part
+        at += len(part)
+    gram = raw @ np.swapaxes(raw, 1, 2)
+    size = np.sqrt(np.diagonal(gram, axis1=1, axis2=2))
+    unit = inverse_of(size)
+    whole = EntryBlock(chosen, size, raw, raw[:, :, :0], raw[:, :, 0], gram * unit[:, :, None] * unit[:, None, :])
+    products = whole.products(np.column_stack([sight.basis, sight.residual]))
     absorbed, along = products[:, :, :-1], products[:, :, -1]
-    gram = raw @ np.swapaxes(raw, 1, 2) - absorbed @ np.swapaxes(absorbed, 1, 2)
-    return EntryBlock(chosen, size, raw, absorbed, along, gram)
+    return replace(whole, absorbed=absorbed, along=along, gram=whole.gram - absorbed @ np.swapaxes(absorbed, 1, 2))
 
 
 def _deflated(block: EntryBlock, span: Floats, part: Floats) -> EntryBlock:
     """`part` (k,) of the residual along the span."""
-    more = (block.raw.reshape(-1, block.raw.shape[2]) @ span).reshape(*block.raw.shape[:2], -1)
+    more = block.products(span)
     gram = block.gram - more @ np.swapaxes(more, 1, 2)
     absorbed = np.concatenate([block.absorbed, more], axis=2)
     return EntryBlock(block.entries, block.size, block.raw, absorbed, block.along - more @ part, gram)

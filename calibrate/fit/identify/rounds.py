@@ -101,7 +101,7 @@ def wary_fit(weighting: Weighting, start: Floats) -> Floats:
         letting_go = turn >= BLUNT_ROUNDS
         each = zip(problem.blocks, distances(problem, theta), strict=True)
         blocks = [_wary(block, distance, letting_go=letting_go) for block, distance in each]
-        old, theta = theta, _solved(problem.with_blocks(tuple(blocks)), theta, NEAR_START, Redundant.REMOVED)[0].theta
+        old, theta = theta, _fitted(problem.with_blocks(tuple(blocks)), theta, NEAR_START, Redundant.REMOVED)[0].theta
         if letting_go and np.max(np.abs(theta - old) / plausible_sizes(problem.parameters)) < STANDING:
             break
     return theta
@@ -130,11 +130,18 @@ def _solved(
     problem: JointProblem, start: Floats, damping: float, redundant: Redundant, by: Estimator = LEAST_SQUARES
 ) -> tuple[Fit, Identifiability]:
     """Least squares of what can be determined at the start, and the rank at the end."""
-    seen = analyse(problem.fulfilled(start).jacobian(start), problem.parameters)
-    fit = by.fit(problem.with_parameters(reduced(problem.parameters, seen, redundant)), start, damping)
+    fit, seen = _fitted(problem, start, damping, redundant, by)
     if fit.status is not Status.NOT_FINITE:
         seen = analyse(problem.fulfilled(fit.theta).jacobian(fit.theta), problem.parameters)
     return fit, seen
+
+
+def _fitted(
+    problem: JointProblem, start: Floats, damping: float, redundant: Redundant, by: Estimator = LEAST_SQUARES
+) -> tuple[Fit, Identifiability]:
+    """Least squares of what can be determined at the start, and the rank there."""
+    seen = analyse(problem.fulfilled(start).jacobian(start), problem.parameters)
+    return by.fit(problem.with_parameters(reduced(problem.parameters, seen, redundant)), start, damping), seen
 
 
 def _wary(block: Block, distance: Floats, *, letting_go: bool) -> Block:
