@@ -202,8 +202,8 @@ def figures() -> tuple[Figure, ...]:
 
 
 TODAY = {
-    "files": 766,
-    "code": 81_651,
+    "files": 768,
+    "code": 82_000,
     "longest_function": 53,
     "one_importer": 2,
     "classes": 0,

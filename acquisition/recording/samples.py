@@ -29,13 +29,14 @@ POSITION = ("x_m", "y_m", "z_m")
 ORIENTATION = ("rx_rad", "ry_rad", "rz_rad")  # beside a position: a full pose
 WIRE = "wire_m"
 SEAT = "seat"
+PLANE = "plane"
 BAR, BAR_END = "bar", "bar_end"
 MEASURED = (*SPOTS, WIRE, *(f"{device}{name}" for device in ("", "camera_") for name in (*POSITION, *ORIENTATION)))
 CONTROLLER = tuple(f"controller_{name}" for name in (*POSITION, *ORIENTATION))  # its own pose of its tool in its base
 TARGET = "target"  # which [[target]] of the rig a row is of
 COMPLETE_PER_JOINT = (("q", "_rad"), ("cmd", "_rad"), ("enc", "_rad"))  # one column for every joint, or none
 
-_INTEGERS = re.compile(r"placement|first_psd|seat|bar|repeat|approach[1-9][0-9]*")
+_INTEGERS = re.compile(r"placement|first_psd|seat|plane|bar|repeat|approach[1-9][0-9]*")
 _PER_JOINT = re.compile(r"(?P<stem>q|cmd|enc|approach|qd|last_move)(?P<joint>[0-9]{1,4})(?P<unit>_rad_s|_rad|)")
 _UNITS = {"q": "_rad", "cmd": "_rad", "enc": "_rad", "qd": "_rad_s", "approach": "", "last_move": "_rad"}
 

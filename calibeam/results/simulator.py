@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.recording import Recording, Samples
-from acquisition.recording.samples import BAR, BAR_END, SEAT, cells_of, per_joint
+from acquisition.recording.samples import BAR, BAR_END, PLANE, SEAT, cells_of, per_joint
 from calibrate.apply.predicting import predict_with_physics
 from calibrate.compare.matched import is_seated
 from calibrate.errors import DataError
@@ -33,7 +33,7 @@ Floats = NDArray[np.float64]
 PLACE = "{samples}"
 TIMEOUT_S = 60.0
 SHOWN = 300  # characters of what a program that failed has written
-INPUTS = ("placement", "first_psd", SEAT, BAR, "target")  # stated of a reading, not read
+INPUTS = ("placement", "first_psd", SEAT, PLANE, BAR, "target")  # stated of a reading, not read
 
 
 @dataclass(frozen=True)

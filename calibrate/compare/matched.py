@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.recording import Samples
-from acquisition.recording.samples import BAR, BAR_END, SEAT, per_joint
+from acquisition.recording.samples import BAR, BAR_END, PLANE, SEAT, per_joint
 from calibrate.errors import DataError
 from calibrate.model.predict import Predictor
 
@@ -38,7 +38,7 @@ NONE = -1
 def is_seated(samples: Samples) -> Bools:
     """(row,)"""
     seated = np.zeros(len(samples), dtype=bool)
-    for name in (SEAT, BAR):
+    for name in (SEAT, PLANE, BAR):
         if name in samples:
             seated |= samples.integers(name, NONE) != NONE
     return seated
@@ -94,7 +94,7 @@ MOST = 0.9
 MOST_ROWS = 5_000  # of a table whose rows are found by joint angles: two tables of so many take half a gigabyte
 # A constant of a joint beyond any servo, that hardly varies: another zero of degrees.
 CONSTANT_RAD, VARIES = 0.05, 0.2
-WHAT = ("placement", "first_psd", SEAT, BAR, BAR_END, "target")  # where both state it, it must be the same
+WHAT = ("placement", "first_psd", SEAT, PLANE, BAR, BAR_END, "target")  # where both state it, it must be the same
 ORDERED = (*WHAT, "repeat")
 
 Key = tuple[object, ...]  # of a sample: its place in the plan

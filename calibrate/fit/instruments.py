@@ -67,7 +67,7 @@ def instruments_of(
     if all(Trait.BETWEEN_ENCODERS in kind.traits for kind, found in built if found is not None):
         raise DataError(
             "samples: no row holds an observation; columns of one are psd1_x_m ... with placement and first_psd, "
-            "x_m y_m z_m, camera_x_m ..., wire_m, seat, or bar with bar_end"
+            "x_m y_m z_m, camera_x_m ..., wire_m, seat, plane, or bar with bar_end"
         )
     known = tuple(block for kind, found in built if found is not None for block in kind.lengths(table))
     weighting = Weighting(measured, assumed_noise(rig).joint_rad, known)

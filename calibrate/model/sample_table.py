@@ -112,7 +112,9 @@ class SampleTable:
             found_m = find(self)
             if found_m is not None:
                 return Target(found_m, UNKNOWN_PLAUSIBLE_M)
-        raise DataError(f"rig {self.rig.name}: wire and bar rows need tool.point_m, the target in the flange frame")
+        raise DataError(
+            f"rig {self.rig.name}: wire, bar and plane rows need tool.point_m, the target in the flange frame"
+        )
 
     def targets(self, rows: Indices) -> SeveralTargets | None:
         """Those that the samples name at these rows; None where they name none, and the tool's point is meant.

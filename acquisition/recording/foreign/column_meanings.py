@@ -35,7 +35,18 @@ SINGLE: Mapping[str, tuple[str, str]] = MappingProxyType(
         **{f"psd{k}_sum": (f"psd{k}_sum_v", "v") for k in (1, 2)},
         **{
             name: (name, "")
-            for name in ("placement", "first_psd", "seat", "bar", "bar_end", "sphere", "series", "repeat", "target")
+            for name in (
+                "placement",
+                "first_psd",
+                "seat",
+                "plane",
+                "bar",
+                "bar_end",
+                "sphere",
+                "series",
+                "repeat",
+                "target",
+            )
         },
     }
 )

@@ -50,6 +50,7 @@ OWN_NAMES = ("psd", "spots", "encoders", "robot", "tracker", "camera", "can", "c
 SLOWEST_TRACKER_HZ = 5.0  # a stream that pauses longer counts as silent
 TRACKER_COLUMNS = ("x", "y", "z", "time", "status", "temperature")
 SHORTEST = 1e-6  # feels right: no hand writes a direction so short
+FLAT_RAD, RIGHT_RAD = 0.1, 1.5709  # a smaller angle of planes has no usable derivative; they have no sides
 
 
 def faults(rig: Rig) -> Iterator[Fault]:
@@ -179,6 +180,16 @@ def _placement_faults(rig: Rig) -> Iterator[Fault]:
                 yield (*path, key), f"{key} = {number} is no placement of this rig (it has {known}); correct it"
         if distance.from_placement == distance.to_placement:
             yield (*path, "to"), f"from and to are the same {distance.of} {distance.to_placement}; a distance needs two"
+    for index, angle in enumerate(rig.known_angles):
+        path = ("known_angle", index)
+        if angle.from_plane == angle.to_plane:
+            yield (*path, "to"), f"from and to are the same plane {angle.to_plane}; an angle needs two"
+        if not FLAT_RAD <= angle.angle_rad <= RIGHT_RAD:
+            yield (
+                (*path, "angle_rad"),
+                f"angle_rad = {angle.angle_rad:g} is not between {FLAT_RAD} and a right angle (1.5708): planes have no "
+                'sides; give the smaller angle, and of parallel planes their distance ([[known_distance]] of = "plane")',
+            )
 
 
 def _twice(table: KeyPath, ids: tuple[int, ...]) -> Iterator[Fault]:

@@ -165,13 +165,22 @@ class Placement(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class KnownDistance(Struct, frozen=True, forbid_unknown_fields=True):
-    """A known distance: between the PSD 1 centres of two placements, or two seats of unknown place. Source of scale."""
+    """A known distance: between the PSD 1 centres of two placements, two seats, or two parallel planes."""
 
     from_placement: Identity = field(name="from")
     to_placement: Identity = field(name="to")
     length_m: RoomSize
     sigma_m: SigmaMetres
-    of: Literal["placement", "seat"] = "placement"
+    of: Literal["placement", "seat", "plane"] = "placement"
+
+
+class KnownAngle(Struct, frozen=True, forbid_unknown_fields=True):
+    """A known angle between two touched planes, up to a right angle."""
+
+    from_plane: Identity = field(name="from")
+    to_plane: Identity = field(name="to")
+    angle_rad: Radians
+    sigma_rad: SigmaRadians
 
 
 class Bar(Struct, frozen=True, forbid_unknown_fields=True):
@@ -225,6 +234,7 @@ class Noise(Struct, frozen=True, forbid_unknown_fields=True):
     position_m: SigmaMetres | None = None
     wire_m: SigmaMetres | None = None
     seat_m: SigmaMetres | None = None
+    plane_m: SigmaMetres | None = None
     camera_m: tuple[SigmaMetres, SigmaMetres, SigmaMetres] | None = None  # along x, y, z of the camera
     camera_rad: tuple[SigmaRadians, SigmaRadians, SigmaRadians] | None = None  # about x, y, z of the camera
     joint_rad: SigmaRadians | None = None
@@ -386,6 +396,7 @@ class Rig(Struct, frozen=True, forbid_unknown_fields=True):
     placement_list: Few[Placement] = field(name="placement", default=())
     device: Pose | None = None  # measuring device of position and wire observations, in the base frame
     known_distances: Few[KnownDistance] = field(name="known_distance", default=())
+    known_angles: Few[KnownAngle] = field(name="known_angle", default=())
     bar_list: Few[Bar] = field(name="bar", default=())
     bar_position_list: Few[BarPosition] = field(name="bar_position", default=())
     seat_list: Few[Seat] = field(name="seat", default=())

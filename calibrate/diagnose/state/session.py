@@ -79,12 +79,12 @@ def _link_prior(rig: Rig, samples: Samples) -> LinkTolerance | None:
     if rig.tolerance is not None:
         return None
     held = [k for k in SENSORS if Trait.TARGET in k.traits and k.columns[0] in samples]
-    scaleless = held and all(Trait.SCALELESS in k.traits for k in held) and not _distances_of_seats(rig)
+    scaleless = held and all(Trait.SCALELESS in k.traits for k in held) and not _distances_of_points(rig)
     return SCALELESS if scaleless else WIDE
 
 
-def _distances_of_seats(rig: Rig) -> bool:
-    return any(distance.of == "seat" for distance in rig.known_distances)
+def _distances_of_points(rig: Rig) -> bool:
+    return any(distance.of != "placement" for distance in rig.known_distances)
 
 
 def _with_priors(rig: Rig, link_prior: LinkTolerance | None) -> Rig:

@@ -180,14 +180,15 @@ def alarms_of(stated: StatedNoise, repeats: RepeatNoise | None) -> tuple[str, ..
 
 
 def scale_alarms(instruments: Iterable[str], known_lengths: int = 0) -> tuple[str, ...]:
-    """A sentence for a session of cones alone; none where any instrument measures a length, or one is known.
+    """A sentence for a session of cones and planes alone; none where any instrument measures a length, or one is known.
 
-    A factor on all lengths of arm and seats leaves tip less seat at zero: a point-only fit cannot fix scale.
+    A factor on all lengths of arm, seats and planes leaves every distance at zero: contact alone cannot fix scale.
     """
-    if set(instruments) != SCALELESS or known_lengths:
+    used = set(instruments)
+    if not used or not used <= SCALELESS or known_lengths:
         return ()
     return (
-        "cones alone determine no length: the size of the arm stays nominal, and every length that it measures is "
+        "cones and planes alone determine no length: the size of the arm stays nominal, and every length that it measures is "
         "as uncertain as that; measure a bar of known length ([[bar]], columns bar and bar_end) as well, "
-        'or state the distance of two cones ([[known_distance]] of = "seat")',
+        'or state the distance of two cones or parallel planes ([[known_distance]] of = "seat" or "plane")',
     )

@@ -13,7 +13,7 @@ from msgspec import structs
 from numpy.typing import NDArray
 
 from acquisition.recording import Samples
-from acquisition.recording.samples import SEAT, required
+from acquisition.recording.samples import PLANE, SEAT, required
 from calibrate.errors import DataError
 from calibrate.model.effect_records import EffectRecord
 from calibrate.model.effects.conditions import MOVED_RAD, moves_of
@@ -35,7 +35,7 @@ from calibrate.model.with_effects.acting import (
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
-USED_AS = ("placement", "first_psd", SEAT, "target")  # of the instrument or the tool: else a row has another reading
+USED_AS = ("placement", "first_psd", SEAT, PLANE, "target")  # instrument or tool: else a row has another reading
 BY_JOINT = {
     "approach": "approach{}",
     "last_move": "last_move{}_rad",

@@ -14,6 +14,7 @@ from calibrate.model.rigid import transform
 from calibrate.model.sensors.catalogue import BY_NAME
 from calibrate.model.sensors.encoder_difference import EncoderDifference
 from calibrate.model.sensors.full_pose import FullPose
+from calibrate.model.sensors.plane import Plane, best_planes
 from calibrate.model.sensors.point_line import PointLine, meeting_points
 from calibrate.model.sensors.position import Position
 from calibrate.model.sensors.seat import Seat, mean_tips
@@ -63,6 +64,7 @@ SENSORS = {
     "camera-pose": camera,
     "wire": lambda: Wire(TARGET, DEVICE),
     "seat": lambda: Seat(TARGET, mean_tips(flanges(1)[:, :3, 3], GROUP)),
+    "plane": lambda: Plane(TARGET, best_planes(flanges(1)[:, :3, 3], np.ones(POSES, dtype=int))),
     "encoder-difference": lambda: EncoderDifference((2, 3), np.array([0.4, -3.0])),
     "point": lambda: PointLine(MOUNT, meeting_points(MOUNT, flanges(1), GROUP)),
 }
