@@ -187,8 +187,8 @@ def _placement_faults(rig: Rig) -> Iterator[Fault]:
         if not FLAT_RAD <= angle.angle_rad <= RIGHT_RAD:
             yield (
                 (*path, "angle_rad"),
-                f"angle_rad = {angle.angle_rad:g} is not between {FLAT_RAD} and a right angle (1.5708): planes have no "
-                'sides; give the smaller angle, and of parallel planes their distance ([[known_distance]] of = "plane")',
+                f"angle_rad = {angle.angle_rad:g} is not between {FLAT_RAD} and a right angle (1.5708): planes have "
+                'no sides; give the smaller angle, and of parallel planes their distance ([[known_distance]] of = "plane")',
             )
 
 
