@@ -188,7 +188,7 @@ def _placement_faults(rig: Rig) -> Iterator[Fault]:
             yield (
                 (*path, "angle_rad"),
                 f"angle_rad = {angle.angle_rad:g} is not between {FLAT_RAD} and a right angle (1.5708): planes have "
-                'no sides; give the smaller angle, and of parallel planes their distance ([[known_distance]] of = "plane")',
+                'no sides; give the smaller one, and of parallel ones the distance ([[known_distance]] of = "plane")',
             )
 
 
