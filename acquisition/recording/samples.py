@@ -131,7 +131,7 @@ class Samples:
             yield dict(zip(self.columns, row, strict=True))
 
     def _stacked(self, names: tuple[str, ...]) -> Floats:
-        return np.array([self.column(name) for name in names]).reshape(len(names), len(self)).T
+        return np.stack([self.column(name) for name in names], axis=1) if names else np.zeros((len(self), 0))
 
     def _stacked_or_none(self, names: tuple[str, ...]) -> Floats | None:
         return self._stacked(names) if all(name in self.columns for name in names) else None
