@@ -80,8 +80,8 @@ def import_command(
     Parameters
     ----------
     source
-        A table; a session folder, with its folder "streams" if it has one; a ROS 2 bag; or a CAN log: .blf, .asc, .csv
-        or .log (candump).
+        A table; a session folder, with its folder "streams" if it has one; a bag of ROS 2 or 1; or a CAN log: .blf,
+        .asc, .csv or .log (candump).
     others
         Further logs of the same time, with --streams; further seats, with --seat-from.
     out

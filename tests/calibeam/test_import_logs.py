@@ -9,6 +9,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
+from rosbags.rosbag1 import Writer as OldWriter
 from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
 from scipy.spatial.transform import Rotation
@@ -162,17 +163,19 @@ UR_PLACES = (2, 1, 0, 3, 4, 5)
 
 
 def write_bag(path, storage, stamp_s, q_rad, names, places):
-    """Joint states on the robot's clock, received 3 ms later, and poses of a tracker."""
-    store = get_typestore(Stores.ROS2_HUMBLE)
-    types = store.types
+    """Joint states on the robot's clock, received 3 ms later, and poses of a tracker. Without `storage` of ROS 1."""
+    old = storage is None
+    store = get_typestore(Stores.ROS1_NOETIC if old else Stores.ROS2_HUMBLE)
+    types, serialized = store.types, store.serialize_ros1 if old else store.serialize_cdr
+    writer = OldWriter(path) if old else Writer(path, version=9, storage_plugin=storage)
     header, stamp = types["std_msgs/msg/Header"], types["builtin_interfaces/msg/Time"]
     turns = Rotation.random(len(stamp_s), random_state=3)
-    with Writer(path, version=9, storage_plugin=storage) as bag:
+    with writer as bag:
         kinds = {"/joint_states": "sensor_msgs/msg/JointState", "/tracker/pose": "geometry_msgs/msg/PoseStamped"}
         topics = {topic: bag.add_connection(topic, kind, typestore=store) for topic, kind in kinds.items()}
-        for t, q, xyzw in zip(stamp_s, q_rad, turns.as_quat(), strict=True):
+        for number, (t, q, xyzw) in enumerate(zip(stamp_s, q_rad, turns.as_quat(), strict=True)):
             ns = round((EPOCH_S + t) * 1e9)
-            now = header(stamp(*divmod(ns, 10**9)), "base")
+            now = header(*([number] if old else []), stamp(*divmod(ns, 10**9)), "base")
             empty = np.empty(0)
             state = types[kinds["/joint_states"]](now, list(names), q[list(places)], empty, empty)
             pose = types["geometry_msgs/msg/Pose"](
@@ -180,16 +183,17 @@ def write_bag(path, storage, stamp_s, q_rad, names, places):
             )
             stamped = types[kinds["/tracker/pose"]](now, pose)
             for topic, message in (("/joint_states", state), ("/tracker/pose", stamped)):
-                data = store.serialize_cdr(message, kinds[topic])
+                data = serialized(message, kinds[topic])
                 bag.write(topics[topic], ns + 3_000_000, data)
     return turns
 
 
-@pytest.mark.parametrize("storage", list(StoragePlugin), ids=lambda plugin: plugin.value)
+@pytest.mark.parametrize("storage", [*StoragePlugin, None], ids=lambda one: one.value if one else "ros1")
 def test_bags_bring_joints_in_the_order_of_the_arm_and_poses(tmp_path, way, storage):
     stamp_s, q_rad = (values[:200] for values in joints(way))
-    turns = write_bag(tmp_path / "bag", storage, stamp_s, q_rad, UR_ORDER, UR_PLACES)
-    recording = imported(tmp_path / "bag.mcap", tmp_path / "bag")
+    path = tmp_path / ("bag" if storage else "robot.bag")
+    turns = write_bag(path, storage, stamp_s, q_rad, UR_ORDER, UR_PLACES)
+    recording = imported(tmp_path / "bag.mcap", path)
     robot, tracker = recording.streams["joint_states"], recording.streams["tracker-pose"]
     np.testing.assert_allclose(robot.values["actual_q_rad"], q_rad, rtol=1e-12)
     np.testing.assert_allclose(robot.host_s - robot.device_s, 3e-3, atol=1e-6)

@@ -1,4 +1,4 @@
-"""Logs of other programs as streams: one table a device, each row a moment; ROS 2 bags are tables, too, one a topic.
+"""Logs of other programs as streams: one table a device, each row a moment; bags of ROS are tables, too, one a topic.
 
 Joints become channels that the diagnosis of streams reads (`actual_q_rad`, `target_q_rad`, `position_rad`); what has no
 meaning of its own is kept under its heading, in SI where its unit is known. `host_s` is the time of the table, from the
@@ -36,7 +36,8 @@ from acquisition.recording.mcap.scan import check_batches
 from acquisition.recording.recording import Channel, Recording, Stream, check_declaration
 from acquisition.recording.sample_rules import no_samples
 
-BAG_SUFFIXES = (".db3", ".mcap")
+ROS_1 = ".bag"
+BAG_SUFFIXES = (".db3", ".mcap", ROS_1)
 JOINT_STATE, POSE_STAMPED = "sensor_msgs/msg/JointState", "geometry_msgs/msg/PoseStamped"
 # Universal Robots' own names, which their driver does not send in this order: ur_description, urdf/ur_macro.xacro
 UR_JOINTS = (
@@ -241,13 +242,15 @@ def _factor(group: Group) -> float:
 
 
 def _bag(path: Path) -> list[Sheet]:
-    """Each topic of joint states and stamped poses of a ROS 2 bag as a table."""
-    reader = importlib.import_module("rosbags.rosbag2")
+    """Each topic of joint states and stamped poses of a bag as a table: of ROS 2, or a file of ROS 1."""
+    old = path.suffix.lower() == ROS_1
+    reader = importlib.import_module("rosbags.rosbag1" if old else "rosbags.rosbag2")
     types = importlib.import_module("rosbags.typesys")
     if not path.exists():
         raise RecordingError(f"{path}: no such bag; check the path")
     try:
-        store = types.get_typestore(types.Stores.ROS2_HUMBLE)
+        store = types.get_typestore(types.Stores.ROS1_NOETIC if old else types.Stores.ROS2_HUMBLE)
+        message_of = store.deserialize_ros1 if old else store.deserialize_cdr
         files = [one for one in path.rglob("*") if one.is_file()] if path.is_dir() else [path]
         for file in (one for one in files if one.suffix == ".mcap"):
             check_batches(file)
@@ -262,10 +265,10 @@ def _bag(path: Path) -> list[Sheet]:
                     raise ValueError(
                         f"more than {len(rows[connection.topic])} messages of '{connection.topic}': take a part of it"
                     )
-                rows[connection.topic].append((received_ns, store.deserialize_cdr(raw, connection.msgtype)))
+                rows[connection.topic].append((received_ns, message_of(raw, connection.msgtype)))
     except Exception as error:  # of damaged bytes the libraries below raise whatever they stumble over
         raise RecordingError(
-            f"{path}: no ROS 2 bag that can be read ({shown(str(error) or type(error).__name__, 80)}); check the path"
+            f"{path}: no bag of ROS that can be read ({shown(str(error) or type(error).__name__, 80)}); check the path"
         ) from error
     if not wanted:
         raise RecordingError(

@@ -97,7 +97,7 @@ def _fitted(columns: Floats, parted: Floats, block: Ints) -> RobustLine | None:
 
 
 def _unseen(columns: Floats, parted: Floats, block: Ints) -> float | None:
-    """Rms of what fits to the other blocks leave, over FOLDS stretches of blocks; None where they do not determine it."""
+    """Rms of what fits to the other stretches leave; None where these do not determine it. See FOLDS."""
     squares: list[float] = []
     numbers, at = np.unique(block, return_inverse=True)
     part = at * FOLDS // max(len(numbers), FOLDS)

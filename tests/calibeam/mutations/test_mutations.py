@@ -68,7 +68,7 @@ FOUND = (  # what mutations have shown once: file, change, command line, what is
         "report tracker --model model.json",
         "no covariance is",
     ),
-    ("bag-db3/metadata.yaml", lambda data: b"\xff" + data, BAG, "no ROS 2 bag that can be read"),
+    ("bag-db3/metadata.yaml", lambda data: b"\xff" + data, BAG, "no bag of ROS that can be read"),
 )
 AWAY = re.compile(  # of a session without its devices, and of a program whose second pose is out of reach
     r"serial port away/|could not open port|127\.0\.0\.9|not fit for a session|cannot be opened|have no command"
