@@ -131,7 +131,7 @@ def _node_position(
 ) -> NodePosition | None:
     mapping = tuple(
         codec.mapped_object(objects.get((codec.TPDO2_MAPPING, entry), 0))
-        for entry in range(1, objects.get((codec.TPDO2_MAPPING, 0), 0) + 1)
+        for entry in range(1, (objects.get((codec.TPDO2_MAPPING, 0), 0) & 0xFF) + 1)  # UNSIGNED8
     )
     number = codec.mapped_number(mapping, codec.POSITION) or codec.MappedNumber(0, 32)
     pdo_id = objects.get((codec.TPDO2_COMMUNICATION, 1), PDO2 + node) & 0x7FF

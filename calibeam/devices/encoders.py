@@ -47,10 +47,15 @@ def sample_rate(blocks: Sequence[Block], wanted_hz: float) -> tuple[float, str]:
 
 
 def sample_noise(values: Floats) -> float:
-    """One sigma of the noisiest column from neighbouring samples (von Neumann 1941); slow motion does not count."""
-    steps = np.diff(values, axis=0)
-    steps = steps[np.isfinite(steps).all(axis=1)] if np.isfinite(steps).all(axis=1).any() else np.nan_to_num(steps)
-    return float(np.sqrt(0.5 * (steps**2).mean(axis=0)).max()) if len(steps) else 0.0
+    """One sigma of the noisiest column from third differences: smooth motion does not count.
+
+    Variance of the k-th differences of white noise is binomial(2k, k) sigma^2: Anderson, The Statistical Analysis of
+    Time Series, 1971, section 3.4. Samples beside one that is missing are left out.
+    """
+    third = np.diff(values, n=3, axis=0)
+    there = np.isfinite(third)
+    squares = np.where(there, third, 0.0) ** 2
+    return float(np.sqrt(squares.sum(axis=0) / (20.0 * np.maximum(there.sum(axis=0), 1))).max())
 
 
 def uneven_layers(faces: Sequence[FaceIdentity], lit: Sequence[bool], current_a: Floats) -> str:

@@ -29,6 +29,17 @@ def test_noise_is_that_of_the_noisiest_column_whatever_it_moves() -> None:
     assert sample_noise(drifting) == pytest.approx(0.03, rel=0.05)
 
 
+def test_noise_of_a_shaft_that_turns_to_and_fro() -> None:
+    time_s, rng = 0.01 * np.arange(4000.0), np.random.default_rng(2)
+    turning_rad = 10.0 * np.sin(0.3 * time_s)[:, None] + rng.normal(0.0, 5e-6, (4000, 2))
+    assert sample_noise(turning_rad) == pytest.approx(5e-6, rel=0.1)
+    turning_rad[1000:1005, 0] = np.nan  # no answer
+    assert sample_noise(turning_rad) == pytest.approx(5e-6, rel=0.1)
+    turning_rad[:, 1] = np.nan
+    assert sample_noise(turning_rad) == pytest.approx(5e-6, rel=0.1)
+    assert sample_noise(turning_rad[:2]) == 0.0
+
+
 @pytest.mark.parametrize(("share", "wrong"), [(1.0, ""), (0.99, ""), (0.9, "face 2 differ by 11 %")])
 def test_layers_of_a_face_that_do_not_carry_the_same_current(share: float, wrong: str) -> None:
     current_a = np.tile(1e-5 * np.array([1.0, 1.0, 1.0, 1.0, 1.0, 1.0, share, share]), (50, 1))

@@ -322,6 +322,10 @@ def _encoder_faults(encoders: EncodersDevice, n_joints: int) -> Iterator[Fault]:
     yield from _strangers(ENCODERS, encoders, CIA406_ONLY if plain else DBC_ONLY, encoders.driver.value)
     if plain and encoders.dbc is None:
         yield ENCODERS, "[devices.encoders] of driver \"can-dbc\" needs 'dbc', the file that describes the encoders"
+    units = encoders.units_per_turn
+    if not plain and units is not None and (units < 2.0 or not units.is_integer()):
+        why = f"units_per_turn = {units:g}: encoders of CiA 406 count a whole number a turn, from 2; correct it"
+        yield (*ENCODERS, "units_per_turn"), why
     key = "signals" if plain else "nodes"
     named = encoders.named
     if n_joints == 0 and not named:

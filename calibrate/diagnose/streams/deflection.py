@@ -20,6 +20,7 @@ from calibrate.diagnose.streams import limits
 from calibrate.diagnose.streams.clock import RobustLine, fit
 from calibrate.diagnose.streams.track import Outcome, Track
 
+FOLDS = 20  # stretches of the motion that are left out in turn; one for each block takes minutes for a long recording
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 
@@ -96,10 +97,12 @@ def _fitted(columns: Floats, parted: Floats, block: Ints) -> RobustLine | None:
 
 
 def _unseen(columns: Floats, parted: Floats, block: Ints) -> float | None:
-    """Rms of what fits to the other blocks leave in each block; None where they do not determine it."""
+    """Rms that fits to the others leave in each of FOLDS stretches of blocks; None where they do not determine it."""
     squares: list[float] = []
-    for one in np.unique(block):
-        seen = block != one
+    numbers, at = np.unique(block, return_inverse=True)
+    part = at * FOLDS // max(len(numbers), FOLDS)
+    for one in np.unique(part):
+        seen = part != one
         line = _fitted(columns[seen], parted[seen], block[seen])
         if line is None:
             return None

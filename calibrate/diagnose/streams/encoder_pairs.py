@@ -25,6 +25,7 @@ Floats = NDArray[np.float64]
 INTERVALS = 200  # of time, between which steps are sought
 BLOCKS = 40  # of time that are left out in turn, for the sigma
 FEWEST = 4 * INTERVALS  # rows
+MOVES_RAD = 0.02  # more than discs off their centres differ by; below, the shaft stands
 UNLIKE = 0.05  # of the motion: what differs by more does not follow the same shaft one to one
 BEYOND = 5.0  # of what is left of the difference, for a step
 TURN_RAD = 2.0 * np.pi
@@ -78,7 +79,8 @@ def _pair(device: StreamDevice, k: int) -> EncoderPair:
     sense = 1.0 if float(q_moves @ other_moves) >= 0.0 else -1.0
     d = other_moves - sense * q_moves
     noise = float(white_noise(d[:, None])[0]) / np.sqrt(2.0)
-    if float(np.std(d)) > max(UNLIKE * float(np.std(q)), BEYOND * noise):
+    moves = max(float(np.ptp(q)), float(np.ptp(other))) > MOVES_RAD
+    if moves and float(np.std(d)) > max(UNLIKE * float(np.std(q)), BEYOND * noise):
         return EncoderPair(
             k + 1, why=f"it does not follow encoder 1 one to one (they differ by {np.std(d):.3g} rad rms)"
         )

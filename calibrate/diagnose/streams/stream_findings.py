@@ -141,9 +141,10 @@ def deflection_finding(one: Deflection) -> StreamFinding:
         "stiffness_nm_per_rad": Size(stiffness, one.sigma * stiffness**2),
     }
     says = (
-        f"the two encoders of joint {one.joint} part by {with_sigma(1e6 * one.compliance, 1e6 * one.sigma)} µrad a Nm: "
-        f"stiffness {1e-6 * stiffness:.3g} ± {1e-6 * one.sigma * stiffness**2:.2g} Nm/µrad; unseen seconds are missed "
-        f"by {1e6 * one.unseen_after_rad:.0f} in place of {1e6 * one.unseen_before_rad:.0f} µrad"
+        f"the two encoders of joint {one.joint} differ by {with_sigma(1e6 * one.compliance, 1e6 * one.sigma)} µrad/Nm: "
+        f"stiffness {with_sigma(1e-3 * stiffness, 1e-3 * one.sigma * stiffness**2)} kNm/rad; on seconds that the fit "
+        f"has not seen {1e6 * one.unseen_after_rad:.0f} µrad (rms) are left, "
+        f"{1e6 * one.unseen_before_rad:.0f} without it"
     )
     return StreamFinding(name, "encoders", Outcome.FOUND, sizes, None, None, max(one.p, CERTAIN), says)
 

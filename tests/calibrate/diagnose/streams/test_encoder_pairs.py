@@ -81,3 +81,10 @@ def test_pace_leaves_missing_rows_out() -> None:
     assert pace.period_s == pytest.approx(0.010, abs=1e-4)
     assert pace.jitter_s == pytest.approx(np.std([0.010, 0.011, 0.010]), rel=1e-9)
     assert pace.longest_s == pytest.approx(0.029)
+
+
+def test_a_shaft_that_stands_is_no_encoder_that_does_not_follow() -> None:
+    time_s = 0.01 * np.arange(4000.0)
+    drifting = np.round(np.stack([np.zeros(4000), 1e-4 * np.sin(0.1 * time_s)], axis=1) / 2e-5) * 2e-5
+    pair = examine_encoders(StreamDevice(Track("encoders", "rad", time_s, drifting), np.arange(4000), time_s))[1][0]
+    assert pair.why == "eccentricity: the shaft turns through 0°, not 360°"
