@@ -25,9 +25,7 @@ from calibrate.compare.comparison_file import (
     NameOfCause,
 )
 from calibrate.compare.difference_explained import Explanation, explain, notes_of
-from calibrate.compare.fit_to_simulation import (
-    Constant,
-)
+from calibrate.compare.fit_to_simulation import Constant
 from calibrate.compare.link_differs import (
     ROUNDING,
     JudgedLink,
@@ -49,9 +47,7 @@ from calibrate.compare.rig_and_streams import (
     zero_mismatches,
 )
 from calibrate.compare.rig_keys import rig_differences
-from calibrate.compare.streams import (
-    stream_pairs,
-)
+from calibrate.compare.streams import stream_pairs
 from calibrate.diagnose.assess import Named, Verdict
 from calibrate.diagnose.record.schema import SizeRecord
 from calibrate.diagnose.streams import devices_of

@@ -7,9 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.recording import Recording
-from calibrate.compare.chain import (
-    Difference,
-)
+from calibrate.compare.chain import Difference
 from calibrate.compare.comparison_file import (
     ComparisonFile,
     DifferenceRecord,
@@ -18,12 +16,8 @@ from calibrate.compare.comparison_file import (
     Side,
     StreamRecord,
 )
-from calibrate.compare.fit_to_simulation import (
-    SimulationFit,
-)
-from calibrate.compare.link_differs import (
-    JudgedLink,
-)
+from calibrate.compare.fit_to_simulation import SimulationFit
+from calibrate.compare.link_differs import JudgedLink
 from calibrate.compare.rig_keys import RigKey, rig_differences
 from calibrate.compare.streams import (
     ZEROLESS,

@@ -334,11 +334,9 @@ def _encoder_faults(encoders: EncodersDevice, n_joints: int) -> Iterator[Fault]:
     if plain and encoders.dbc is None:
         yield ENCODERS, "[devices.encoders] of driver \"can-dbc\" needs 'dbc', the file that describes the encoders"
     units = encoders.units_per_turn
-    if not plain and units is not None and not (units >= 2.0 and units.is_integer()):
-        yield (
-            (*ENCODERS, "units_per_turn"),
-            f"units_per_turn = {units:g}: an encoder of CiA 406 counts a whole number a turn, from 2; correct it",
-        )
+    if not plain and units is not None and (units < 2.0 or not units.is_integer()):
+        why = f"units_per_turn = {units:g}: encoders of CiA 406 count a whole number a turn, from 2; correct it"
+        yield (*ENCODERS, "units_per_turn"), why
     key = "signals" if plain else "nodes"
     named = encoders.named
     if n_joints == 0 and not named:

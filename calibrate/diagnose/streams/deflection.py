@@ -97,7 +97,7 @@ def _fitted(columns: Floats, parted: Floats, block: Ints) -> RobustLine | None:
 
 
 def _unseen(columns: Floats, parted: Floats, block: Ints) -> float | None:
-    """Rms of what fits to the other stretches leave; None where these do not determine it. See FOLDS."""
+    """Rms that fits to the others leave in each of FOLDS stretches of blocks; None where they do not determine it."""
     squares: list[float] = []
     numbers, at = np.unique(block, return_inverse=True)
     part = at * FOLDS // max(len(numbers), FOLDS)

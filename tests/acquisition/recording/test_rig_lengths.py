@@ -100,3 +100,9 @@ def test_a_position_beyond_a_kilometre_is_refused_with_the_same_remedy() -> None
     header = "t_s,q1_rad,x_m,y_m,z_m\n"
     with pytest.raises(SamplesError, match=r"row 1 .*column 'x_m': 1234.5 is beyond 1000.*divided by 1000"):
         parse_csv(f"{header}0,0,1234.5,10,20\n", "samples.csv", parse_rig(RIG, "rig.toml"))
+
+
+def test_counts_a_turn_that_no_encoder_of_cia_406_has() -> None:
+    text = (Path(__file__).parents[3] / "rigs" / "encoders.toml").read_text()
+    with pytest.raises(RigFileError, match=r"line 12: units_per_turn = 0.3: encoders of CiA 406 .*; correct it"):
+        parse_rig(text.replace("sync_hz = 100.0", "sync_hz = 100.0\nunits_per_turn = 0.3"), "rig.toml")
