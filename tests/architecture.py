@@ -203,7 +203,7 @@ def figures() -> tuple[Figure, ...]:
 
 TODAY = {
     "files": 766,
-    "code": 81_620,
+    "code": 81_710,
     "longest_function": 53,
     "one_importer": 2,
     "classes": 0,

@@ -1,4 +1,4 @@
-"""Logs of other programs as streams: one table a device, each row a moment; ROS 2 bags are tables, too, one a topic.
+"""Logs of other programs as streams: one table a device, each row a moment; of ROS bags (1 and 2) one a topic.
 
 Joints become channels that the diagnosis of streams reads (`actual_q_rad`, `target_q_rad`, `position_rad`); what has no
 meaning of its own is kept under its heading, in SI where its unit is known. `host_s` is the time of the table, from the
@@ -33,10 +33,10 @@ from acquisition.recording.foreign.conversion import (
 from acquisition.recording.foreign.heading_units import si_symbol, unit_of
 from acquisition.recording.foreign.sheet import Raw, Sheet, read_sheet
 from acquisition.recording.mcap.scan import check_batches
-from acquisition.recording.recording import Channel, Recording, Stream, check_declaration
+from acquisition.recording.recording import Channel, Recording, Stamps, Stream, check_declaration
 from acquisition.recording.sample_rules import no_samples
 
-BAG_SUFFIXES = (".db3", ".mcap")
+BAG_SUFFIXES = (".db3", ".mcap", ".bag")
 JOINT_STATE, POSE_STAMPED = "sensor_msgs/msg/JointState", "geometry_msgs/msg/PoseStamped"
 # Universal Robots' own names, which their driver does not send in this order: ur_description, urdf/ur_macro.xacro
 UR_JOINTS = (
@@ -110,13 +110,18 @@ def stream_name(sheet: Sheet) -> str:
     return name if name[:1].isalpha() else f"log-{name}".rstrip("-")
 
 
-def recording_of(tables: Sequence[Understanding], path: Path) -> tuple[Recording, datetime | None]:
+def recording_of(
+    tables: Sequence[Understanding], path: Path, stamps: Stamps = "unknown"
+) -> tuple[Recording, datetime | None]:
     """The streams of all logs as one recording without samples, and when it began, where a calendar has it.
+
+    `stamps`: what their times are, as the user states it.
 
     SamplesError where their times have nothing in common.
     """
     start = _start(tables)
-    streams = [_stream(table, base) for table, base in zip(tables, start.bases, strict=True)]
+    each = zip(tables, start.bases, strict=True)
+    streams = [replace(_stream(table, base), stamps=stamps) for table, base in each]
     first = tables[0]
     recording = Recording(
         path=path,
@@ -241,13 +246,15 @@ def _factor(group: Group) -> float:
 
 
 def _bag(path: Path) -> list[Sheet]:
-    """Each topic of joint states and stamped poses of a ROS 2 bag as a table."""
-    reader = importlib.import_module("rosbags.rosbag2")
+    """Each topic of joint states and stamped poses of a bag of ROS 2, or of ROS 1 (.bag), as a table."""
+    is_first = path.suffix.lower() == ".bag" and path.is_file()
+    reader = importlib.import_module("rosbags.rosbag1" if is_first else "rosbags.rosbag2")
     types = importlib.import_module("rosbags.typesys")
     if not path.exists():
         raise RecordingError(f"{path}: no such bag; check the path")
     try:
-        store = types.get_typestore(types.Stores.ROS2_HUMBLE)
+        store = types.get_typestore(types.Stores.ROS1_NOETIC if is_first else types.Stores.ROS2_HUMBLE)
+        decode = store.deserialize_ros1 if is_first else store.deserialize_cdr
         files = [one for one in path.rglob("*") if one.is_file()] if path.is_dir() else [path]
         for file in (one for one in files if one.suffix == ".mcap"):
             check_batches(file)
@@ -262,10 +269,12 @@ def _bag(path: Path) -> list[Sheet]:
                     raise ValueError(
                         f"more than {len(rows[connection.topic])} messages of '{connection.topic}': take a part of it"
                     )
-                rows[connection.topic].append((received_ns, store.deserialize_cdr(raw, connection.msgtype)))
+                rows[connection.topic].append((received_ns, decode(raw, connection.msgtype)))
     except Exception as error:  # of damaged bytes the libraries below raise whatever they stumble over
+        version = 1 if is_first else 2
         raise RecordingError(
-            f"{path}: no ROS 2 bag that can be read ({shown(str(error) or type(error).__name__, 80)}); check the path"
+            f"{path}: no ROS {version} bag that can be read ({shown(str(error) or type(error).__name__, 80)}); "
+            "check the path"
         ) from error
     if not wanted:
         raise RecordingError(
