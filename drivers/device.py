@@ -8,7 +8,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Generic, Protocol, TypeVar
+from typing import Any, Generic, Literal, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +18,7 @@ from drivers.errors import DeviceLost
 
 Floats = NDArray[np.float64]
 LineT = TypeVar("LineT")
+Stamps = Literal["sampled", "sent", "arrived", "hardware", "unknown"]  # what device_s is the time of
 
 
 @dataclass(frozen=True)
@@ -39,7 +40,7 @@ class Block:
     """
 
     host_s: Floats  # (sample,) host clock when the bytes arrived
-    device_s: Floats  # (sample,) the device's own clock
+    device_s: Floats  # (sample,) the device's own clock, or what `stamps` of the device states
     sequence: NDArray[np.int64]  # (sample,) counts up by one
     values: Mapping[str, NDArray[Any]]  # channel name -> (sample, *shape), SI
 
@@ -62,11 +63,18 @@ class Device(Protocol):
         ...
 
 
+def stamps_of(device: object) -> Stamps:
+    """What the device's stamps are; a driver that does not state it leaves them unknown."""
+    return getattr(device, "stamps", "unknown")
+
+
 class StreamDevice(ABC, Generic[LineT]):
     """What every `Device` with a line of its own does alike: open, set up or close again, know whether it is open.
 
     One thread uses it at a time, except `close`, which any thread may call. A device adds `describe` and `read`.
     """
+
+    stamps: Stamps = "unknown"  # a driver states it: its reading, its sending, its arrival here, or at an adapter
 
     def __init__(self, name: str, clock: Clock | None) -> None:
         self.name = name

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +22,8 @@ from acquisition.recording.samples import Floats, Samples
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 _STREAM_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]*")
 _RESERVED = ("host_s", "device_s", "sequence")
+Stamps = Literal["sampled", "sent", "arrived", "hardware", "unknown"]
+STAMPS: tuple[Stamps, ...] = get_args(Stamps)
 
 
 def time_utc(text: str) -> datetime:
@@ -69,6 +71,7 @@ class Stream:
     sequence: NDArray[np.int64]  # (sample,)
     values: Mapping[str, NDArray[Any]]  # channel name -> (sample, *shape), SI
     gaps: tuple[Gap, ...] = ()
+    stamps: Stamps = "unknown"  # what device_s states, where it is a number: docs/formats.md
 
 
 @dataclass(frozen=True)

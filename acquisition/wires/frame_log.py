@@ -20,6 +20,7 @@ from acquisition.recording.can_frames import (
     channels,
 )
 from acquisition.recording.can_log import frame_of
+from acquisition.recording.recording import Stamps
 from drivers.clock import Clock
 
 _ERROR = int(FrameFlag.ERROR)  # comparing with a member of an enumeration takes ten times as long
@@ -37,7 +38,14 @@ class FrameStream(Protocol):
 class Streams(Protocol):
     """A recording, or one that rotates."""
 
-    def stream(self, name: str, channels: tuple[Channel, ...], viewer: tuple[str, ...] | None = None) -> FrameStream:
+    def stream(
+        self,
+        name: str,
+        channels: tuple[Channel, ...],
+        viewer: tuple[str, ...] | None = None,
+        *,
+        stamps: Stamps = "unknown",
+    ) -> FrameStream:
         """Declare a stream."""
         ...
 
@@ -52,7 +60,9 @@ class FrameLog:
         self.count = 0  # frames heard so far
         self.errors = 0  # error frames among them
         self._recording = recording
-        self._classic = _Counted(recording.stream(STREAM, channels(CLASSIC_BYTES), viewer=()), CLASSIC_BYTES)
+        self._classic = _Counted(
+            recording.stream(STREAM, channels(CLASSIC_BYTES), viewer=(), stamps="hardware"), CLASSIC_BYTES
+        )
         self._long: _Counted | None = None
         self._now_s: Callable[[], float] = clock.now_s
         self._turn = threading.Lock()
@@ -92,7 +102,9 @@ class FrameLog:
 
     def _write_long(self, frames: Sequence[Frame]) -> None:
         if self._long is None:
-            self._long = _Counted(self._recording.stream(FD_STREAM, channels(FD_BYTES), viewer=()), FD_BYTES)
+            self._long = _Counted(
+                self._recording.stream(FD_STREAM, channels(FD_BYTES), viewer=(), stamps="hardware"), FD_BYTES
+            )
         self._long.append(frames)
 
 

@@ -55,7 +55,10 @@ def check_recording(path: Path, *, as_json: bool = False, controller_arm: Path |
 def lines(recording: Recording, findings: tuple[Finding, ...]) -> list[str]:
     """For a person: the file, each stream with its rate and clock, each finding."""
     reported = [f"{recording.path}: settled samples: {len(recording.samples)}, events: {len(recording.events)}"]
-    reported += [f"  {stream.name}: {_rate(stream)}; {_clock(stream)}" for stream in recording.streams.values()]
+    reported += [
+        f"  {stream.name}: {_rate(stream)}; {_clock(stream)}; time stamp: {stream.stamps}"
+        for stream in recording.streams.values()
+    ]
     reported += [f"  encoders: {line}" for line in encoder_lines(recording)]
     reported += [f"  {f.severity.value}: {f.problem.value}: {f.where}: {f.says}" for f in findings[:MOST_LINES]]
     if len(findings) > MOST_LINES:
@@ -138,7 +141,12 @@ def _as_json(recording: Recording, findings: tuple[Finding, ...]) -> dict[str, A
         "complete": recording.complete,
         "samples": len(recording.samples),
         "streams": {
-            stream.name: {"samples": stream.host_s.size, "gaps": len(stream.gaps), "clock": _model(clock_model(stream))}
+            stream.name: {
+                "samples": stream.host_s.size,
+                "stamps": stream.stamps,
+                "gaps": len(stream.gaps),
+                "clock": _model(clock_model(stream)),
+            }
             for stream in recording.streams.values()
         },
         "encoders": list(encoder_lines(recording)),

@@ -34,6 +34,7 @@ from acquisition.recording.foreign import (
     write_columns,
     write_session,
 )
+from acquisition.recording.recording import Stamps
 from acquisition.recording.rig import load_rig, rig_text
 from acquisition.recording.session_folder import CSV, PARQUET, RIG
 from acquisition.recording.session_folder.folder_import import import_folder, write_recording
@@ -59,6 +60,7 @@ def import_command(
     header_row: Annotated[int, Parameter(validator=validators.Number(gte=0))] | None = None,
     seat_from: Literal["file"] | None = None,
     streams: bool = False,
+    stamps: Stamps | None = None,
     yes: bool = False,
 ) -> None:
     """Make a session of a table, a log or a session folder.
@@ -102,6 +104,9 @@ def import_command(
         of the files, of a folder by name; the name of a seat is its folder and file: front_left/hole_0.
     streams
         A row of a table is a moment, not a pose: make a recording of streams.
+    stamps
+        What the times of a log are: `sampled` (clock of the device when it measured), `sent`, `arrived` (at the program
+        that wrote the log) or `hardware` (of a CAN adapter).
     yes
         Take the columns as they are understood, without asking. An open unit is an error then.
 
@@ -112,7 +117,7 @@ def import_command(
         if others:
             raise RecordingError(f"{others[0]}: a session folder is imported by itself; leave the others out")
         given = {"rig": rig, "columns": columns, "sheet": sheet, "header_row": header_row, "streams": streams}
-        _refuse(source, "a session folder has its own rig.toml", **given)
+        _refuse(source, "a session folder has its own rig.toml", **given, stamps=stamps)
         with taken_back(out):
             import_folder(source, out, software=SOFTWARE)
         print(f"{out}: {len(read(out).samples)} samples")
@@ -120,7 +125,7 @@ def import_command(
     for path in (source, *others):
         _check_known(path)
     if seat_from is not None:
-        _refuse(source, "the postures in a seat have no time", streams=streams)
+        _refuse(source, "the postures in a seat have no time", streams=streams, stamps=stamps)
     if sheet is not None and not any(path.suffix.lower() in WORKBOOKS for path in (source, *others)):
         raise RecordingError(f"{source}: --sheet {sheet}: only a workbook has sheets; leave --sheet out")
     if rig is None:
@@ -132,10 +137,13 @@ def import_command(
         _refuse(
             source, "a CAN log has no columns", columns=columns, sheet=sheet, header_row=header_row, streams=streams
         )
+        _refuse(source, "frames of a CAN log keep the stamps of the log", stamps=stamps)
         _can(source, out, rig)
     elif streams or source.is_dir() or source.suffix.lower() in BAG_SUFFIXES:
         sheets = [table for path in (source, *others) for table in _log_tables(path, (sheet, header_row), rig, out)]
-        _logs(understand_logs(sheets, rig_text(rig), str(rig), columns), out, yes=yes)
+        _logs(understand_logs(sheets, rig_text(rig), str(rig), columns), out, stamps or "unknown", yes=yes)
+    elif stamps is not None:
+        raise RecordingError(f"{source}: --stamps states what the times of a log are; give --streams for a log")
     elif others:
         raise RecordingError(
             f"{others[0]}: one table becomes one session; give --streams for several logs of one time, or "
@@ -209,13 +217,13 @@ def _log_tables(path: Path, place: tuple[str | None, int | None], rig: Path, out
     return (encoder_sheet(encoder_rows(frames, encoders), frames, path),)
 
 
-def _logs(tables: Sequence[Understanding], out: Path, *, yes: bool) -> None:
+def _logs(tables: Sequence[Understanding], out: Path, stamps: Stamps, *, yes: bool) -> None:
     """A recording of streams, after a person has agreed to what the columns mean."""
     if out.suffix.lower() != ".mcap":
         raise RecordingError(f"--out {out}: logs become a recording; give a name that ends with .mcap")
     console = Console()
     tables = [with_units(table, yes=yes, settled=False) for table in tables]
-    recording, started_utc = recording_of(tables, out)
+    recording, started_utc = recording_of(tables, out, stamps)
     about = [columns_file(table, None, SOFTWARE) for table in tables]
     for one in about:
         print_columns(console, one)

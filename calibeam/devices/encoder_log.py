@@ -25,7 +25,7 @@ from calibeam.outcome import ENDING, heard_by
 from calibeam.site_log import SITE_LOG
 from calibeam.software import SOFTWARE
 from drivers.clock import Clock
-from drivers.device import Block
+from drivers.device import Block, stamps_of
 from drivers.errors import DeviceError
 
 YOUNG = 20_000  # objects made and not yet gone, before Python searches for cycles: a block has less than a thousand
@@ -111,6 +111,7 @@ class EncoderLog:
                 self._device.name,
                 tuple(Channel(c.name, c.unit, c.shape, c.full_scale, c.resolution) for c in self._device.describe()),
                 self._viewed,
+                stamps=stamps_of(self._driver),
             )
         except BaseException:
             with uninterrupted():

@@ -35,7 +35,7 @@ from calibeam.live.feed import PAGE_STOP, SILENT, Feed
 from calibeam.motion.gate_of_rig import gated_arm
 from calibrate.model.dual_psd_rig import fixture_of, laser_of
 from drivers.clock import Clock
-from drivers.device import Block, Device, Movable
+from drivers.device import Block, Device, Movable, stamps_of
 from drivers.errors import DeviceError, DeviceRefused
 
 DRIVEN_JOINTS = 6
@@ -210,7 +210,7 @@ def _released(arm: Movable) -> None:
 
 def _spots_writer(psd: PsdInstrument, device: PsdDevice, writer: RecordingWriter) -> Callable[[Block], None]:
     """Spots of every block as a stream of their own, one sample a block: what a viewer shows without set-up."""
-    stream = writer.stream("spots", tuple(Channel(name, "m") for name in SPOTS))
+    stream = writer.stream("spots", tuple(Channel(name, "m") for name in SPOTS), stamps=stamps_of(psd))
     count = itertools.count()
     seen: list[PsdView] = []  # made with the first block: before, the faces are unknown
 
@@ -256,7 +256,7 @@ def _pumped(
         viewed = tuple(
             name for name in VIEWED.get(device.name, scalars) if name in {channel.name for channel in channels}
         )
-        stream = kept.writer.stream(device.name, channels, viewed)
+        stream = kept.writer.stream(device.name, channels, viewed, stamps=stamps_of(device))
         pump.start()
         with kept.supervisor.watching(device.name, lambda: newest_s(pump), silence_s * STALE_S / SILENCE_S):
             yield pump

@@ -26,6 +26,7 @@ from calibeam.guided.judge import FittedJudge
 from calibeam.outcome import PartialResult, interruption
 from calibrate.model.arms.rig_arm import RigArm
 from drivers.clock import Clock
+from drivers.device import stamps_of
 
 Floats = NDArray[np.float64]
 ARRIVED_M = 1e-6  # far below what a person can do
@@ -81,7 +82,7 @@ def watching(address: EncoderAddress, writer: RecordingWriter, clock: Clock) -> 
 
     try:
         channels = tuple(Channel(c.name, c.unit, c.shape, c.full_scale, c.resolution) for c in driver.describe())
-        stream = writer.stream(driver.name, channels, VIEWED)
+        stream = writer.stream(driver.name, channels, VIEWED, stamps=stamps_of(driver))
         writer.event(Event(clock.now_s(), "encoders", {"identities": identities_of(driver)}))
         pump = Pump(
             driver,

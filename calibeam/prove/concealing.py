@@ -92,7 +92,9 @@ def _write(case: Case, session: StreamedSession, path: Path) -> None:
             writer.event(Event(HOST_S + at_s, "sample", {"psd_from_s": from_s, "psd_to_s": to_s}))
         for name, stream in session.streams.items():
             channels = tuple(Channel(c, UNITS[c], values.shape[1:]) for c, values in stream.values.items())
-            writer.stream(name, channels).append(stream.host_s, stream.device_s, stream.sequence, stream.values)
+            writer.stream(name, channels, stamps="sampled").append(
+                stream.host_s, stream.device_s, stream.sequence, stream.values
+            )
 
 
 def _rows(case: Case, session: StreamedSession) -> list[Mapping[str, Any]]:

@@ -14,7 +14,7 @@ import numpy as np
 from drivers.can_dbc.description import JointSignal
 from drivers.cia406.codec import SPEED_LIMIT_RAD_S, ContinuousAngle
 from drivers.clock import Clock
-from drivers.device import Block, Channel, StreamDevice
+from drivers.device import Block, Channel, Stamps, StreamDevice
 from drivers.errors import DeviceStale
 from drivers.transports.can_bus import BusFaults, OpenBus, lost_as_device_lost, opened, shut_down
 
@@ -40,6 +40,8 @@ class CanDbcEncoders(StreamDevice[can.BusABC]):
     A row is complete when every encoder has sent, or when one sends again before the others did. Rows from before a
     failure come with the next read.
     """
+
+    stamps: Stamps = "arrived"
 
     def __init__(
         self,

@@ -28,7 +28,7 @@ from drivers.cia406.configuration import (
 from drivers.cia406.cycle import Row, SyncCycle, WatchedRow, to_block
 from drivers.cia406.health import NodeWatch
 from drivers.clock import Clock
-from drivers.device import Block, Channel, StreamDevice
+from drivers.device import Block, Channel, Stamps, StreamDevice
 from drivers.errors import DeviceLost, DeviceRefused, DeviceStale
 from drivers.transports.can_bus import BusFault, BusFaults, OpenBus, lost_as_device_lost, opened, received, shut_down
 
@@ -48,6 +48,8 @@ class Cia406Encoders(StreamDevice[can.BusABC]):
     their own. host_s is when the last answer was taken, TOGETHER_S after it came at most.
     `Cia406Encoders(bus_opener("socketcan", "can0", 1_000_000), nodes=[1, 2, 3, 4, 5, 6])`.
     """
+
+    stamps: Stamps = "sent"
 
     def __init__(
         self,

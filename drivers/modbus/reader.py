@@ -10,7 +10,7 @@ import math
 import numpy as np
 
 from drivers.clock import Clock, SystemClock
-from drivers.device import Block, Channel, Floats
+from drivers.device import Block, Channel, Floats, Stamps
 from drivers.errors import DeviceStale
 from drivers.modbus.line import ModbusLine
 from drivers.modbus.register_map import JOINTS, LIFE, RegisterMap
@@ -21,6 +21,8 @@ TORN_RAD = math.pi  # no joint turns by half a turn between two polls: angle and
 
 class ModbusReader:
     """A `Device`. `line` may be shared with whoever moves the arm."""
+
+    stamps: Stamps = "sent"
 
     def __init__(
         self,

@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from typing import TypeVar
 
 from drivers.clock import Clock
-from drivers.device import Block, Channel, StreamDevice
+from drivers.device import Block, Channel, Stamps, StreamDevice
 from drivers.errors import DeviceLost, DeviceRefused, DeviceStale, WireError
 from drivers.psd_daq.codec import PsdDaqCodec, RepeatFilter, SequenceCount, to_block
 from drivers.psd_daq.messages import (
@@ -71,6 +71,8 @@ class PsdDaq(StreamDevice[Transport]):
     `open_line` is called by every `connect`, so a box that was unplugged is found again by serial number:
     `PsdDaq(lambda: open_serial(SerialAddress(port="/dev/ttyUSB0"), BAUD), rate_hz=1000.0)`.
     """
+
+    stamps: Stamps = "sampled"
 
     def __init__(
         self,

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.clock import Clock
-from drivers.device import Block, Channel, StreamDevice
+from drivers.device import Block, Channel, Stamps, StreamDevice
 from drivers.errors import DeviceLost, DeviceRefused, DeviceStale, WireError
 from drivers.psd_daq.messages import FaceIdentity, Flag, Identity
 from drivers.psd_faces import FaceKind
@@ -110,6 +110,8 @@ class Kpa101Pair(StreamDevice[tuple[Kpa101Unit, ...]]):
     are corner currents with the same differences and sum, four for each face (see `Wiring`), so that all that reads a
     DAQ box reads a pair of units.
     """
+
+    stamps: Stamps = "sent"
 
     def __init__(
         self,

@@ -94,6 +94,7 @@ class LineTracker(StreamDevice[Transport]):
         while not self._pending and self.bad_lines < HEADER_LINES and (left_s := self._left_s(deadline_s)) > 0.0:
             self._receive(left_s)
         if self._pending:
+            self.stamps = "sampled" if math.isfinite(self._pending[0][2].device_s) else "arrived"
             return
         if self.last_bad is not None:
             raise DeviceRefused(

@@ -23,7 +23,7 @@ from typing import TypeVar
 import numpy as np
 
 from drivers.clock import Clock
-from drivers.device import Block, Channel, StreamDevice
+from drivers.device import Block, Channel, Stamps, StreamDevice
 from drivers.errors import DeviceLost, DeviceRefused, DeviceStale, WireError
 from drivers.ur.rtde_codec import (
     DTYPES,
@@ -94,6 +94,8 @@ NOT_FOUND = "NOT_FOUND"
 
 class UrReader(StreamDevice[socket.socket]):
     """A `Device`: joints, currents, temperatures and states at up to 500 Hz."""
+
+    stamps: Stamps = "sampled"
 
     def __init__(
         self,

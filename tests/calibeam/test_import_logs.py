@@ -317,3 +317,29 @@ def test_columns_of_some_joints_need_the_numbers_of_these_joints(tmp_path, way, 
     said = " ".join(capsys.readouterr().err.split())
     assert "enc of 2 of 6 joints" in said
     assert "left, right" in said
+
+
+def test_a_bag_of_ros_1_is_read_and_its_stamps_are_what_the_user_states(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    store = get_typestore(Stores.ROS1_NOETIC)
+    header, time = store.types["std_msgs/msg/Header"], store.types["builtin_interfaces/msg/Time"]
+    with OldWriter(tmp_path / "arm.bag") as bag:
+        kind = "sensor_msgs/msg/JointState"
+        topic = bag.add_connection("/joint_states", kind, typestore=store)
+        for row in range(20):
+            at = header(seq=row, stamp=time(sec=1_700_000_000, nanosec=row * 10_000_000), frame_id="")
+            message = store.types[kind](at, [f"joint_{k}" for k in range(1, 7)], *[np.full(6, 0.1 * row)] * 3)
+            bag.write(topic, 1_700_000_000 * 10**9 + row * 10_000_000 + 3_000_000, store.serialize_ros1(message, kind))
+    out = tmp_path / "arm.mcap"
+    rig = Path(__file__).parents[2] / "rigs" / "ur5e-dual-psd.toml"
+    said = ["--rig", str(rig), "--stamps", "sent", "--yes", "--out", str(out)]
+    assert run(["import", str(tmp_path / "arm.bag"), *said]) == 0
+    stream = read(out).streams["joint_states"]
+    np.testing.assert_allclose(stream.values["actual_q_rad"], 0.1 * np.arange(20.0)[:, None] * np.ones(6), atol=1e-12)
+    np.testing.assert_allclose(stream.host_s - stream.device_s, 3e-3, atol=1e-6)
+    assert stream.stamps == "sent"
+    run(["check", str(out)])
+    assert "time stamp: sent" in capsys.readouterr().out
+    assert run(["export", str(out), "--streams", "--out", str(tmp_path / "folder")]) == 0
+    assert read(tmp_path / "folder").streams["joint_states"].stamps == "sent"

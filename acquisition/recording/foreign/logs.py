@@ -33,7 +33,7 @@ from acquisition.recording.foreign.conversion import (
 from acquisition.recording.foreign.heading_units import si_symbol, unit_of
 from acquisition.recording.foreign.sheet import Raw, Sheet, read_sheet
 from acquisition.recording.mcap.scan import check_batches
-from acquisition.recording.recording import Channel, Recording, Stream, check_declaration
+from acquisition.recording.recording import Channel, Recording, Stamps, Stream, check_declaration
 from acquisition.recording.sample_rules import no_samples
 
 ROS_1 = ".bag"
@@ -111,13 +111,18 @@ def stream_name(sheet: Sheet) -> str:
     return name if name[:1].isalpha() else f"log-{name}".rstrip("-")
 
 
-def recording_of(tables: Sequence[Understanding], path: Path) -> tuple[Recording, datetime | None]:
+def recording_of(
+    tables: Sequence[Understanding], path: Path, stamps: Stamps = "unknown"
+) -> tuple[Recording, datetime | None]:
     """The streams of all logs as one recording without samples, and when it began, where a calendar has it.
+
+    `stamps`: what their times are, as the user states it.
 
     SamplesError where their times have nothing in common.
     """
     start = _start(tables)
-    streams = [_stream(table, base) for table, base in zip(tables, start.bases, strict=True)]
+    each = zip(tables, start.bases, strict=True)
+    streams = [replace(_stream(table, base), stamps=stamps) for table, base in each]
     first = tables[0]
     recording = Recording(
         path=path,

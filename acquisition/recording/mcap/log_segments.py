@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 from acquisition.recording.errors import RecordingError
 from acquisition.recording.mcap.layout import BEFORE_NOTE, SEGMENT_NOTE
 from acquisition.recording.mcap.writer import Clock, RecordingWriter, StreamWriter
-from acquisition.recording.recording import Channel, Event, Gap
+from acquisition.recording.recording import Channel, Event, Gap, Stamps
 
 _NAME = re.compile(r"segment-(\d+)\.mcap")
 
@@ -50,6 +50,7 @@ class SegmentStream:
     viewer: tuple[str, ...] | None
     writer: StreamWriter
     turn: threading.Lock = field(repr=False)
+    stamps: Stamps = "unknown"
 
     def append(
         self, host_s: ArrayLike, device_s: ArrayLike, sequence: ArrayLike, values: Mapping[str, ArrayLike]
@@ -76,10 +77,18 @@ class SegmentedRecording:
         self._made_folder = not folder.exists()
         self.writer = self._next(_made(folder))
 
-    def stream(self, name: str, channels: tuple[Channel, ...], viewer: tuple[str, ...] | None = None) -> SegmentStream:
+    def stream(
+        self,
+        name: str,
+        channels: tuple[Channel, ...],
+        viewer: tuple[str, ...] | None = None,
+        *,
+        stamps: Stamps = "unknown",
+    ) -> SegmentStream:
         """As `RecordingWriter.stream`."""
         with self._turn:
-            stream = SegmentStream(name, channels, viewer, self.writer.stream(name, channels, viewer), self._turn)
+            writer = self.writer.stream(name, channels, viewer, stamps=stamps)
+            stream = SegmentStream(name, channels, viewer, writer, self._turn, stamps)
             self._streams.append(stream)
             return stream
 
@@ -100,7 +109,9 @@ class SegmentedRecording:
         with self._turn:
             full, self.writer = self.writer, fresh
             for stream in self._streams:
-                stream.writer = fresh.stream(stream.name, stream.channels, stream.viewer, after=stream.writer.last)
+                stream.writer = fresh.stream(
+                    stream.name, stream.channels, stream.viewer, after=stream.writer.last, stamps=stream.stamps
+                )
         full.close()
         return full.path
 

@@ -36,7 +36,7 @@ from acquisition.recording.mcap.layout import (
 )
 from acquisition.recording.mcap.scan import Scan
 from acquisition.recording.mcap.session_parts import joined, parts
-from acquisition.recording.recording import Channel, Event, Gap, Recording, Stream
+from acquisition.recording.recording import STAMPS, Channel, Event, Gap, Recording, Stamps, Stream
 from acquisition.recording.rig import Rig, parse_rig, rig_sha256
 from acquisition.recording.sample_rules import checked_samples, no_samples
 from acquisition.recording.samples import Cell, Samples
@@ -47,6 +47,7 @@ FOREIGN = {
     **dict.fromkeys((".xlsx", ".xlsm", ".csv", ".tsv", ".txt", ".parquet"), "table"),
     **dict.fromkeys((".blf", ".asc", ".log"), "CAN log"),
     ".db3": "ROS 2 bag",
+    ".bag": "ROS 1 bag",
 }
 _CLOCKS = ("host_s", "device_s", "sequence")
 
@@ -93,6 +94,7 @@ class Content:
         self._types: dict[int, MessageType] = {}
         self._channels: dict[int, tuple[McapChannel, Callable[[McapChannel, Any], None] | None]] = {}
         self._declared: dict[str, tuple[Channel, ...]] = {}
+        self._stamps: dict[str, Stamps] = {}
         self._pieces: dict[str, dict[str, _Growing]] = {}
         self._cells = TABLE_CELLS  # of samples and events, that may still be taken
         self._gaps: dict[str, list[Gap]] = {}
@@ -121,12 +123,14 @@ class Content:
             raise ValueError(f"the record '{record.name}' does not fit its checksum")
         self.metadata[record.name] = values
         if record.name.startswith(STREAM_METADATA):
-            self._declare(record.name.removeprefix(STREAM_METADATA), record.metadata["channels"])
+            self._declare(record.name.removeprefix(STREAM_METADATA), record.metadata)
 
-    def _declare(self, name: str, channels_json: str) -> None:
-        rows = msgspec.json.decode(channels_json, type=list[_ChannelRow])
+    def _declare(self, name: str, about: Mapping[str, str]) -> None:
+        rows = msgspec.json.decode(about["channels"], type=list[_ChannelRow])
         channels = (Channel(row.name, row.unit, row.shape, row.full_scale, row.resolution) for row in rows)
         self._declared[name] = tuple(channels)
+        stated = about.get("stamps")  # older recordings state none
+        self._stamps[name] = STAMPS[STAMPS.index(stated)] if stated in STAMPS else "unknown"
 
     def _take_type(self, record: Schema) -> None:
         """Other programs repeat a description in every batch."""
@@ -139,7 +143,7 @@ class Content:
     def _take_channel(self, record: McapChannel) -> None:
         self._channels[record.id] = record, self._taker(record.topic)
         if record.topic.startswith(STREAM_TOPIC):  # stands under a checksum, unlike the metadata record
-            self._declare(record.topic.removeprefix(STREAM_TOPIC), record.metadata["channels"])
+            self._declare(record.topic.removeprefix(STREAM_TOPIC), record.metadata)
 
     def _taker(self, topic: str) -> Callable[[McapChannel, Any], None] | None:
         if topic.startswith(STREAM_TOPIC):
@@ -204,6 +208,7 @@ class Content:
             joined["sequence"].astype(np.int64),
             {channel.name: joined[channel.name].reshape(-1, *channel.shape) for channel in channels},
             tuple(self._gaps.get(name, ())),
+            self._stamps[name],
         )
 
 

@@ -40,7 +40,7 @@ from acquisition.recording.mcap.layout import (
     view_type,
 )
 from acquisition.recording.mcap.mcap_file import McapFile
-from acquisition.recording.recording import Channel, scalar_names
+from acquisition.recording.recording import Channel, Stamps, scalar_names
 from acquisition.recording.samples import Cell, Floats, Kind, kind_of
 
 BATCH = 100  # samples a message: a tenth of the time and of the size of single ones, measured with this library
@@ -65,8 +65,9 @@ class Piece:
 class StreamEncoder:
     """Owned by the writing thread: collects pieces between two flushes and writes them."""
 
-    def __init__(self, name: str, channels: tuple[Channel, ...], viewed: tuple[str, ...]) -> None:
+    def __init__(self, name: str, channels: tuple[Channel, ...], viewed: tuple[str, ...], stamps: Stamps) -> None:
         self._name, self._channels = name, channels
+        self._stamps: Stamps = stamps
         self._viewed = tuple(channel for channel in channels if channel.name in viewed)
         self._pieces: list[Piece] = []
         self._batch: tuple[int, MessageType] | None = None
@@ -95,7 +96,8 @@ class StreamEncoder:
             )
         identifier = self._name.replace("-", "_")
         batch = message_type(f"{identifier}_batch", tuple(fields))
-        self._batch = file.topic(STREAM_TOPIC + self._name, batch, {"channels": channels_json(self._channels)}), batch
+        about = declaration(self._channels, self._stamps)
+        self._batch = file.topic(STREAM_TOPIC + self._name, batch, about), batch
         if self._viewed:
             names = ("host_s", *(name for channel in self._viewed for name in scalar_names(channel)))
             view = view_type(self._name, names)
@@ -127,14 +129,14 @@ class StreamEncoder:
                 file.write(topic, log_ns(host_s), packed(kind, values))
 
 
-def channels_json(channels: tuple[Channel, ...]) -> str:
-    """The declared channels as they stand in the file; an infinite full scale is left out."""
+def declaration(channels: tuple[Channel, ...], stamps: Stamps) -> dict[str, str]:
+    """A declared stream as it stands in the file; an infinite full scale is left out."""
     rows = [
         {"name": channel.name, "unit": channel.unit, "shape": list(channel.shape), "resolution": channel.resolution}
         | ({"full_scale": channel.full_scale} if np.isfinite(channel.full_scale) else {})
         for channel in channels
     ]
-    return msgspec.json.encode(rows).decode()
+    return {"channels": msgspec.json.encode(rows).decode(), "stamps": stamps}
 
 
 def _joined(pieces: list[Piece]) -> Piece:

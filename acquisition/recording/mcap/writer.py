@@ -47,9 +47,9 @@ from acquisition.recording.mcap.write_thread import (
     Scribe,
     Spool,
     StreamEncoder,
-    channels_json,
+    declaration,
 )
-from acquisition.recording.recording import Channel, Event, Gap, check_declaration
+from acquisition.recording.recording import Channel, Event, Gap, Stamps, check_declaration
 from acquisition.recording.rig import parse_rig, rig_sha256
 from acquisition.recording.sample_rules import checked_samples
 from acquisition.recording.samples import Cell, Floats
@@ -250,11 +250,13 @@ class RecordingWriter:
         after: tuple[int, float] | None = None,
         *,
         find_gaps: bool = True,
+        stamps: Stamps = "unknown",
     ) -> StreamWriter:
         """Declare a device's stream. `viewer` names the channels of the thinned 20 Hz view; None: all.
 
         `after`: sequence and host time of the last sample in the file before, where this one goes on with it.
         `find_gaps=False`: gaps are recorded as the caller states them, none is found from the sequence.
+        `stamps`: what device_s is the time of.
         ValueError for names that cannot stand in a file, stand twice, or are not declared.
         """
         channels = tuple(channels)
@@ -266,8 +268,9 @@ class RecordingWriter:
         with self._turn:
             if name in self._streams:
                 raise ValueError(f"stream '{name}' is declared twice; give each device its own name")
-            encoder = StreamEncoder(name, channels, names if viewer is None else viewer)
-            self._spool.put(partial(self._begin_stream, name=name, channels=channels, encoder=encoder), 0)
+            encoder = StreamEncoder(name, channels, names if viewer is None else viewer, stamps)
+            about = declaration(channels, stamps)
+            self._spool.put(partial(self._begin_stream, name=name, about=about, encoder=encoder), 0)
             self._streams.add(name)
             log.info("%s: recorded from now on: %s", name, ", ".join(names))
             put = partial(self._put_piece, encoder)
@@ -323,10 +326,8 @@ class RecordingWriter:
 
     # What the writing thread does with the items of the spool.
 
-    def _begin_stream(
-        self, file: McapFile, *, name: str, channels: tuple[Channel, ...], encoder: StreamEncoder
-    ) -> None:
-        file.metadata(STREAM_METADATA + name, {"channels": channels_json(channels)})
+    def _begin_stream(self, file: McapFile, *, name: str, about: Mapping[str, str], encoder: StreamEncoder) -> None:
+        file.metadata(STREAM_METADATA + name, about)
         self._scribe.encoders.append(encoder)
 
     def _write_message(self, file: McapFile, *, topic: str, kind: MessageType, host_s: float, data: bytes) -> None:

@@ -55,7 +55,9 @@ def write_recording(
 
 def _write_streams(writer: RecordingWriter, source: Recording) -> None:
     """In blocks ordered by time over all streams, so that a viewer finds what belongs to one instant in one place."""
-    inlets = {name: writer.stream(name, s.channels, find_gaps=False) for name, s in source.streams.items()}
+    inlets = {
+        name: writer.stream(name, s.channels, find_gaps=False, stamps=s.stamps) for name, s in source.streams.items()
+    }
     given = 0
     for _, name, rows in heapq.merge(*(_blocks(stream) for stream in source.streams.values())):
         stream = source.streams[name]

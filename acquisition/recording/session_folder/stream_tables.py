@@ -33,7 +33,16 @@ from acquisition.recording.files.bounds import (
 )
 from acquisition.recording.files.json_file import JsonKind, read_json
 from acquisition.recording.files.table_file import check_cells, parquet_table
-from acquisition.recording.recording import Channel, Event, Gap, Recording, Stream, check_declaration, scalar_names
+from acquisition.recording.recording import (
+    Channel,
+    Event,
+    Gap,
+    Recording,
+    Stamps,
+    Stream,
+    check_declaration,
+    scalar_names,
+)
 from acquisition.recording.session_folder.tables import EVENTS, GAPS, TableFormat, table_name, write_tables
 
 FOLDER, ABOUT = "streams", "streams.json"
@@ -58,6 +67,7 @@ class StreamAbout(msgspec.Struct, frozen=True, kw_only=True):
 
     name: Name
     channels: Many[ChannelAbout]
+    stamps: Stamps = "unknown"  # older folders state none
 
 
 class StreamsAbout(msgspec.Struct, frozen=True, kw_only=True):
@@ -86,7 +96,11 @@ def write_streams(recording: Recording, folder: Path, kind: TableFormat) -> list
         complete=recording.complete,
         notes=dict(recording.notes),
         streams=tuple(
-            StreamAbout(name=stream.name, channels=tuple(_about(stream, channel) for channel in stream.channels))
+            StreamAbout(
+                name=stream.name,
+                channels=tuple(_about(stream, channel) for channel in stream.channels),
+                stamps=stream.stamps,
+            )
             for stream in recording.streams.values()
         ),
     )
@@ -166,7 +180,7 @@ def _declared(folder: Path, about: StreamAbout, gaps: Mapping[str, tuple[Gap, ..
         values[channel.name] = np.stack([columns[name] for name in scalar_names(channel)], axis=1).reshape(
             -1, *channel.shape
         )
-    return _stream(path, about.name, channels, columns, values, gaps)
+    return replace(_stream(path, about.name, channels, columns, values, gaps), stamps=about.stamps)
 
 
 def _foreign(path: Path, gaps: Mapping[str, tuple[Gap, ...]]) -> Stream:

@@ -48,7 +48,7 @@ class Recorded:
     def __init__(self) -> None:
         self.streams: dict[str, Kept] = {}
 
-    def stream(self, name, channels, viewer=None) -> Kept:
+    def stream(self, name, channels, viewer=None, stamps="unknown") -> Kept:
         self.streams[name] = Kept(channels[-1].shape[0])
         return self.streams[name]
 
