@@ -59,10 +59,11 @@ lint: $(READY)
 docs: $(READY)
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet --clean
 
-# The concealed proof, then an oracle and other methods on its cases: docs/proof.md. A quarter of an hour on two cores; CASES=150: ten minutes.
+# The concealed proof, then an oracle and other methods on its cases: docs/proof.md. Over half an hour on two cores; CASES=150 WIRE=2: ten minutes.
+# RESUME=1 goes on after an interruption, with the same CASES and WIRE.
 prove: $(BENCH)/.ready
-	rm -rf out/proof
-	$(BENCH)/bin/calibeam prove --cases $(or $(CASES),220) --wire $(or $(WIRE),2) --publish --out out/proof
+	$(if $(RESUME),,rm -rf out/proof)
+	$(BENCH)/bin/calibeam prove --cases $(or $(CASES),400) --wire $(or $(WIRE),12) --publish $(if $(RESUME),--resume) --out out/proof
 	$(BENCH)/bin/python -m benchmarks.proof_comparison out/proof
 
 # Its table into docs/figures.md: of the published seed only.
