@@ -51,7 +51,7 @@ def build_devices(
 ) -> EmulatedDevices:
     """The benches of a rig; `robot_host` goes before the one in [devices.robot]. HostError when there is none."""
     wanted: Mapping[str, Any] = rig.get("devices", {})
-    light = DisturbedLight(world) if isinstance(world, World) else None
+    light = None if isinstance(world, HandWorld | ShaftWorld) else DisturbedLight(world)
     psd = _build(PSDS[wanted["psd"].get("driver", PSD_DAQ)], light, rig) if "psd" in wanted else None
     encoders = _build("encoders", world, rig) if "encoders" in wanted else None
     robot = _robot(world, rig, wanted["robot"], robot_host) if "robot" in wanted else None
@@ -120,11 +120,11 @@ def without_links(devices: EmulatedDevices) -> EmulatedDevices:
         robot=unlinked(devices.robot),
         camera=camera,
         tracker=_anywhere(unlinked(devices.tracker)),
-        others={name: _without_psd(bench) for name, bench in devices.others.items()},
+        others={name: _at_announced_ports(bench) for name, bench in devices.others.items()},
     )
 
 
-def _without_psd(bench: Bench) -> Bench:
+def _at_announced_ports(bench: Bench) -> Bench:
     """On ports that only the announcement names."""
     ports = [
         replace(port, link=None)

@@ -20,8 +20,8 @@ from acquisition.recording.can_frames import (
     channels,
 )
 from acquisition.recording.can_log import frame_of
-from acquisition.recording.recording import Stamps
 from drivers.clock import Clock
+from drivers.device import Stamps
 
 _ERROR = int(FrameFlag.ERROR)  # comparing with a member of an enumeration takes ten times as long
 BLOCK_S = 0.02  # as long as the encoder driver gathers rows: more would only lengthen what a kill loses

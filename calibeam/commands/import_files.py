@@ -17,8 +17,7 @@ from acquisition.recording import Recording, RecordingError, SamplesError, read
 from acquisition.recording.can_log import SUFFIXES as CAN_SUFFIXES
 from acquisition.recording.can_log import CanImport, import_can
 from acquisition.recording.foreign import (
-    BAG_SUFFIXES,
-    SUFFIXES,
+    KINDS,
     ColumnsFile,
     Sheet,
     Understanding,
@@ -34,7 +33,6 @@ from acquisition.recording.foreign import (
     write_columns,
     write_session,
 )
-from acquisition.recording.recording import Stamps
 from acquisition.recording.rig import load_rig, rig_text
 from acquisition.recording.session_folder import CSV, PARQUET, RIG
 from acquisition.recording.session_folder.folder_import import import_folder, write_recording
@@ -43,6 +41,7 @@ from calibeam.console import Console
 from calibeam.outcome import PartialResult, taken_back
 from calibeam.software import SOFTWARE
 from calibrate.quantities import counted, significant
+from drivers.device import Stamps
 
 BAG = "metadata.yaml"  # in the folder of a ROS 2 bag
 WORKBOOKS = (".xlsx", ".xlsm")
@@ -139,7 +138,7 @@ def import_command(
         )
         _refuse(source, "frames of a CAN log keep the stamps of the log", stamps=stamps)
         _can(source, out, rig)
-    elif streams or source.is_dir() or source.suffix.lower() in BAG_SUFFIXES:
+    elif streams or source.is_dir() or KINDS.get(source.suffix.lower()) == "bag":
         sheets = [table for path in (source, *others) for table in _log_tables(path, (sheet, header_row), rig, out)]
         _logs(understand_logs(sheets, rig_text(rig), str(rig), columns), out, stamps or "unknown", yes=yes)
     elif stamps is not None:
@@ -154,7 +153,7 @@ def import_command(
 
 
 def _check_known(path: Path) -> None:
-    known = tuple(dict.fromkeys((*SUFFIXES, *CAN_SUFFIXES, *BAG_SUFFIXES)))
+    known = tuple(dict.fromkeys((*KINDS, *CAN_SUFFIXES)))
     if not path.is_dir() and path.suffix.lower() not in known:
         raise RecordingError(f"{path}: neither a session folder nor one of {', '.join(known)}; give one of these")
 

@@ -16,7 +16,7 @@ from calibeam.cli import EXTRAS
 
 ROOT = Path(__file__).parents[2]
 PROBE = """
-import calibeam.commands.demo, calibeam.rig_files as files
+import calibeam.commands.demo as demo, calibeam.rig_files as files
 from acquisition.recording.rig import load_rig
 assert str(files.RIGS).startswith({where!r}), files.RIGS
 print(load_rig(demo.RIG).name)

@@ -17,12 +17,11 @@ from acquisition.recording.foreign.conversion import (
     write_columns,
     write_session,
 )
-from acquisition.recording.foreign.logs import BAG_SUFFIXES, read_log, recording_of, understand_logs
-from acquisition.recording.foreign.sheet import SUFFIXES, Sheet, read_seats, read_sheet
+from acquisition.recording.foreign.logs import KINDS, read_log, recording_of, understand_logs
+from acquisition.recording.foreign.sheet import Sheet, read_seats, read_sheet
 
 __all__ = [
-    "BAG_SUFFIXES",
-    "SUFFIXES",
+    "KINDS",
     "ColumnsFile",
     "Sheet",
     "Understanding",

@@ -31,13 +31,15 @@ from acquisition.recording.foreign.conversion import (
     understand,
 )
 from acquisition.recording.foreign.heading_units import si_symbol, unit_of
-from acquisition.recording.foreign.sheet import Raw, Sheet, read_sheet
+from acquisition.recording.foreign.sheet import SUFFIXES, Raw, Sheet, read_sheet
 from acquisition.recording.mcap.scan import check_batches
 from acquisition.recording.recording import Channel, Recording, Stamps, Stream, check_declaration
 from acquisition.recording.sample_rules import no_samples
 
 ROS_1 = ".bag"
 BAG_SUFFIXES = (".db3", ".mcap", ROS_1)
+TABLE, BAG = "table", "bag"
+KINDS: Mapping[str, str] = {**dict.fromkeys(SUFFIXES, TABLE), **dict.fromkeys(BAG_SUFFIXES, BAG)}  # by suffix
 JOINT_STATE, POSE_STAMPED = "sensor_msgs/msg/JointState", "geometry_msgs/msg/PoseStamped"
 # Universal Robots' own names, which their driver does not send in this order: ur_description, urdf/ur_macro.xacro
 UR_JOINTS = (
@@ -72,7 +74,7 @@ class LogStart:
 
 def read_log(path: Path, sheet: str | None = None, header_row: int | None = None) -> tuple[Sheet, ...]:
     """The table of a file, or of each topic of a bag. SamplesError, RecordingError naming what cannot be read."""
-    is_bag = path.is_dir() or path.suffix.lower() in BAG_SUFFIXES
+    is_bag = path.is_dir() or KINDS.get(path.suffix.lower()) == BAG
     return tuple(_bag(path)) if is_bag else (read_sheet(path, sheet, header_row),)
 
 

@@ -67,7 +67,7 @@ class StreamAbout(msgspec.Struct, frozen=True, kw_only=True):
 
     name: Name
     channels: Many[ChannelAbout]
-    stamps: Stamps = "unknown"  # older folders state none
+    stamps: Stamps | msgspec.UnsetType = msgspec.UNSET  # where it is known
 
 
 class StreamsAbout(msgspec.Struct, frozen=True, kw_only=True):
@@ -99,7 +99,7 @@ def write_streams(recording: Recording, folder: Path, kind: TableFormat) -> list
             StreamAbout(
                 name=stream.name,
                 channels=tuple(_about(stream, channel) for channel in stream.channels),
-                stamps=stream.stamps,
+                stamps=msgspec.UNSET if stream.stamps == "unknown" else stream.stamps,
             )
             for stream in recording.streams.values()
         ),
@@ -180,7 +180,7 @@ def _declared(folder: Path, about: StreamAbout, gaps: Mapping[str, tuple[Gap, ..
         values[channel.name] = np.stack([columns[name] for name in scalar_names(channel)], axis=1).reshape(
             -1, *channel.shape
         )
-    return replace(_stream(path, about.name, channels, columns, values, gaps), stamps=about.stamps)
+    return replace(_stream(path, about.name, channels, columns, values, gaps), stamps=about.stamps or "unknown")
 
 
 def _foreign(path: Path, gaps: Mapping[str, tuple[Gap, ...]]) -> Stream:

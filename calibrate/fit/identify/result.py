@@ -187,8 +187,9 @@ def scale_alarms(instruments: Iterable[str], known_lengths: int = 0) -> tuple[st
     used = set(instruments)
     if not used or not used <= SCALELESS or known_lengths:
         return ()
+    touched = " and ".join(kind_of(name).noun for name in sorted(used, reverse=True))
     return (
-        "cones and planes alone determine no length: the size of the arm stays nominal, and every length that it "
+        f"{touched} alone determine no length: the size of the arm stays nominal, and every length that it "
         "measures is as uncertain as that; measure a bar of known length ([[bar]], columns bar and bar_end) as well, "
         'or state the distance of two cones or parallel planes ([[known_distance]] of = "seat" or "plane")',
     )

@@ -32,6 +32,7 @@ DOORS = {  # single modules that are open beside the faces: vocabularies, and wh
         for name in (
             "can_frames",
             "can_log",
+            "check_recording",
             "device_clock",
             "files.bounds",
             "mcap.layout",
