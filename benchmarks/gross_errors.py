@@ -17,7 +17,8 @@ from acquisition.recording.rig import Rig
 from benchmarks.healthy import INSTRUMENTS, Drawn
 from benchmarks.with_mistakes import ROWS, WHOLE_FILE, Made, Mistake
 from calibrate.errors import DataError
-from calibrate.fit.identify.identify import refuse_wrong_file, without_gross_errors
+from calibrate.fit.identify.identify import without_gross_errors
+from calibrate.fit.identify.wrong_file import refuse_wrong_file
 from calibrate.model.arms.catalogue import arm_of
 from calibrate.model.checks.witness import Strain
 from calibrate.model.parameters import start_values

@@ -52,7 +52,7 @@ from calibrate.diagnose.assess import Named, Verdict
 from calibrate.diagnose.record.schema import SizeRecord
 from calibrate.diagnose.streams import devices_of
 from calibrate.errors import DataError
-from calibrate.fit.identify.identify import wrong_file
+from calibrate.fit.identify.wrong_file import wrong_file
 from calibrate.model.effects.term import Size
 from calibrate.model.model_file import ModelFile
 

@@ -22,9 +22,10 @@ from calibrate.diagnose import limits
 from calibrate.diagnose.state.session import Session, session_of
 from calibrate.fit.gross_errors import bad_rows
 from calibrate.fit.identify.clean import refuse_most, rows_of
-from calibrate.fit.identify.identify import impossible_rows, wrong_file
+from calibrate.fit.identify.identify import impossible_rows
 from calibrate.fit.identify.rounds import distances, wary_fit
 from calibrate.fit.identify.session import columns_of, shots_of
+from calibrate.fit.identify.wrong_file import wrong_file
 from calibrate.model.alignment import rigid_motion
 from calibrate.model.arms.catalogue import arm_of
 from calibrate.model.checks.gross_error import (

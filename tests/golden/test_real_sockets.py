@@ -6,7 +6,7 @@ import pytest
 
 from benchmarks import sockets
 from calibrate.errors import DataError
-from calibrate.fit.identify.identify import refuse_wrong_file
+from calibrate.fit.identify.wrong_file import refuse_wrong_file
 
 from . import answers
 

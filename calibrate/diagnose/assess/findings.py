@@ -43,6 +43,7 @@ from calibrate.diagnose.search.stated_sizes import sizes_of
 from calibrate.model.effects.curve import unit_of
 from calibrate.model.effects.term import (
     Accepted,
+    Shape,
     Size,
     Term,
     plain,
@@ -149,7 +150,15 @@ def _final(finding: Finding, unknown: Sequence[Finding]) -> bool:
 
     A cause that is in no catalogue need not act through one port only.
     """
-    return not any(finding.share < limits.CURVE_LEFTOVER * u.share or _within(finding.name, u.name) for u in unknown)
+    return not any(
+        finding.share < limits.CURVE_LEFTOVER * u.share or (_within(finding.name, u.name) and not _jumps(finding, u))
+        for u in unknown
+    )
+
+
+def _jumps(finding: Finding, unknown: Finding) -> bool:
+    """Whether a named step is no piece of an unknown curve over the same time: it explains more, and no curve jumps."""
+    return finding.name.shape == Shape.STEP.value and finding.share > unknown.share
 
 
 def _within(name: Named, unknown: Named) -> bool:
@@ -216,7 +225,8 @@ def _no_leftovers(names: Sequence[Finding], unknown: Sequence[Finding]) -> list[
 
 
 def _leftover(finding: Finding, unknown: Finding) -> bool:
-    return finding.name.where == unknown.name.where and set(finding.name.depends_on) <= set(unknown.name.depends_on)
+    here = finding.name.where == unknown.name.where
+    return here and set(finding.name.depends_on) <= set(unknown.name.depends_on) and not _jumps(finding, unknown)
 
 
 def pieces(accepted: Sequence[Accepted], places: int) -> list[tuple[int, ...]]:

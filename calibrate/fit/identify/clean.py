@@ -1,4 +1,4 @@
-"""Gross errors that only a fit shows: bad rows, detector axes counted the other way round, wrong known distances.
+"""Gross errors that only a fit shows: bad rows, detector axes counted the other way round.
 
 Bad rows are found against a fit that they cannot pull, named, and left out before anything is averaged.
 
@@ -18,23 +18,22 @@ from numpy.typing import NDArray
 
 from acquisition.recording import Samples
 from acquisition.recording.rig import Rig
-from acquisition.recording.samples import SEAT, SPOTS
+from acquisition.recording.samples import SPOTS
 from calibrate.errors import DataError
 from calibrate.fit.gross_errors.bad_rows import bad_rows
 from calibrate.fit.identify.rounds import coarse_start, distances, first_fit, wary_fit
-from calibrate.fit.identify.session import columns_of, instruments_for_fit, shots_of
+from calibrate.fit.identify.session import columns_of, shots_of
 from calibrate.fit.instruments import instruments_of
 from calibrate.fit.joint_problem import JointProblem
 from calibrate.fit.weighting import Weighting
 from calibrate.model.arms.catalogue import arm_of
-from calibrate.model.checks.gross_error import LIMIT, GrossError, GrossErrorKind, Shots, outlying, robust_scale
+from calibrate.model.checks.gross_error import GrossError, GrossErrorKind, Shots, outlying, robust_scale
 from calibrate.model.checks.witness import thinned
 from calibrate.model.default_tolerance import links_of
 from calibrate.model.parameters import priors, start_values
 from calibrate.model.problem import Measured
 from calibrate.model.sensors import spots
 from calibrate.model.sensors.catalogue import kind_of
-from calibrate.model.sensors.known_distance import KnownDistances
 
 Floats = NDArray[np.float64]
 FEWEST_POSES = 20  # four numbers each; zeros, links, mount and places are some forty unknowns
@@ -46,8 +45,6 @@ PASSES = 3  # bad rows can hide behind worse ones
 SEVERAL = 3.0  # times the assumed noise, which is often wrong by less
 UNMISTAKABLE = 30.0  # robust sigmas; rows of soft arms lie at up to 16
 UNSEEN = 1e-9  # of the largest singular value, columns scaled: the data do not see it
-SCATTERS = 5.0  # of single balls about their seat: an arm that misses by so much errs less between two seats
-NOMINAL_SHARE = 0.01  # of a length: seats alone leave the scale nominal, and links are drawn to better than this
 MOST_BAD = 0.4  # of the rows: beyond, the question is which of two sessions is the right one
 
 
@@ -206,36 +203,3 @@ def _bad_pairs(measured: Measured, distance: Floats, met: int, away_m: Floats) -
         remedy = "take both again, or remove them"
         out.append(GrossError(GrossErrorKind.BAD_SHOT, rows, ", ".join(columns_of(measured)), what, remedy))
     return out
-
-
-def wrong_distances(rig: Rig, samples: Samples) -> tuple[GrossError, ...]:
-    """Known distances of seats that a fit without any of them contradicts: a wrong number of a seat, a wrong length."""
-    if not any(distance.of == SEAT for distance in rig.known_distances):
-        return ()
-    found = instruments_for_fit(rig, samples)
-    blocks = [block for block in found.weighting.known if isinstance(block, KnownDistances) and block.kind == SEAT]
-    if not blocks:
-        return ()
-    alone = replace(found.weighting, known=())
-    theta = first_fit(alone, coarse_start(alone, found.start))
-    at = dict(zip((p.name for p in alone.parameters), theta, strict=True))
-    index = next(i for i, measured in enumerate(alone.measured) if measured.name == SEAT)
-    misfit_m = alone.measured[index].problem.misfit(alone.unweighted.of_block(index, theta))
-    scatter_m = float(np.sqrt(np.mean(np.sum(misfit_m**2, axis=1))))
-    return tuple(
-        _wrong_distance(block, row, span_m, scatter_m)
-        for block in blocks
-        for row, span_m in enumerate(block.spans_m(np.array([at[p.name] for p in block.parameters])))
-        if abs(span_m - block.length_m[row])
-        > LIMIT * block.sigma_m[row] + SCATTERS * scatter_m + NOMINAL_SHARE * block.length_m[row]
-    )
-
-
-def _wrong_distance(block: KnownDistances, row: int, span_m: float, scatter_m: float) -> GrossError:
-    first, second = block.between[row].tolist()
-    what = (
-        f"seats {first} and {second} are {1e3 * block.length_m[row]:.6g} mm apart by the rig, {1e3 * span_m:.6g} mm by "
-        f"the readings (a ball is {1e3 * scatter_m:.2g} mm from its seat, rms)"
-    )
-    remedy = "correct from, to or length_m of this [[known_distance]], or which rows are of which seat"
-    return GrossError(GrossErrorKind.WRONG_DISTANCE, (), "known_distance", what, remedy)

@@ -4,43 +4,35 @@ A fault of the whole file (angles in degrees, a mirrored axis, ...) is refused b
 docs/decisions/0003 states why rank comes before numbers and why the noise is estimated.
 """
 
-from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
-from msgspec import structs
 from numpy.random import Generator
 from numpy.typing import NDArray
 
 from acquisition.recording import Samples
 from acquisition.recording.files.bounds import ARM_M
-from acquisition.recording.rig import ArmModel, Rig
+from acquisition.recording.rig import Rig
 from acquisition.recording.samples import POSITION
 from calibrate.errors import DataError
 from calibrate.fit.fit_plan import DEFAULT, FitPlan, MethodName
 from calibrate.fit.gross_errors.bad_rows import duplicated_rows, left_alone, rows_beyond_limits
-from calibrate.fit.gross_errors.conventions import wrong_convention, wrong_table
-from calibrate.fit.gross_errors.joint_hypotheses import as_radians, beyond_limits
-from calibrate.fit.identify.clean import clean, mirrored_axes, refuse_most, rows_of, wrong_distances
+from calibrate.fit.identify.clean import clean, refuse_most, rows_of
 from calibrate.fit.identify.evidence import EvidenceOptions, Splitting
 from calibrate.fit.identify.fit_report import result_of
 from calibrate.fit.identify.point_constraint import point_constraints
 from calibrate.fit.identify.result import Identification
 from calibrate.fit.identify.rounds import coarse_start, settled_fit
 from calibrate.fit.identify.session import instruments_for_fit, rig_as_planned, samples_as_planned, standing_at
+from calibrate.fit.identify.wrong_file import drawn_flange, limits_rad, refuse_wrong_file
 from calibrate.fit.instruments import Instruments
 from calibrate.fit.solvers.solve import Estimator
 from calibrate.fit.weighting import Weighting
-from calibrate.model.arms.catalogue import arm_of
 from calibrate.model.checks.gross_error import GrossError
 from calibrate.model.checks.rough_fit import sessions_apart
-from calibrate.model.checks.witness import Witness, by_target
-from calibrate.model.parameters import start_values
-from calibrate.model.sensors.catalogue import witnesses_of
+from calibrate.model.checks.witness import by_target
 
 Floats = NDArray[np.float64]
-
-CONFUSED = {ArmModel.DH: ArmModel.MDH, ArmModel.MDH: ArmModel.DH}
 
 
 def identify(
@@ -88,19 +80,6 @@ def without_gross_errors(
     return weighting, instruments.start, every
 
 
-def refuse_wrong_file(rig: Rig, samples: Samples) -> None:
-    """DataError that names which conventions the file is written by, where they are not those of the rig; also for a
-    rig without an arm.
-    """
-    if rig.n_joints == 0:
-        raise DataError(
-            f"rig {rig.name} has no arm: a log of encoders alone holds no poses to fit; `calibeam check` and `calibeam "
-            "compare` examine it, or add [arm] to the rig file and measure poses"
-        )
-    if gross_errors := wrong_file(rig, samples):
-        raise DataError("; besides, ".join(gross_error.says for gross_error in gross_errors))
-
-
 def _refuse_positions(instruments: Instruments) -> None:
     """DataError where positions, too few for `wrong_file`, are in millimetres or fit only as their mirror image."""
     if (found := instruments.alignment) is None:
@@ -120,46 +99,20 @@ def _refuse_positions(instruments: Instruments) -> None:
     )
 
 
-def wrong_file(rig: Rig, samples: Samples) -> tuple[GrossError, ...]:
-    """Conventions of the whole file that are not those of the rig, and lengths of the rig that the file contradicts."""
-    q_rad, limits_rad = samples.joints(), _limits_rad(rig)
-    in_degrees = beyond_limits(q_rad, limits_rad)
-    if in_degrees is not None:
-        q_rad = as_radians(q_rad, limits_rad)
-    witnesses = witnesses_of(rig, samples, q_rad)
-    found = _wrong_table(rig, witnesses) or wrong_convention(_drawn_flange(rig), witnesses)
-    if in_degrees is None and found is None:
-        found = mirrored_axes(rig, samples)
-    wrong = tuple(gross_error for gross_error in (in_degrees, found) if gross_error is not None)
-    return wrong or wrong_distances(rig, samples)
-
-
-def _wrong_table(rig: Rig, witnesses: Sequence[Witness]) -> GrossError | None:
-    """The two ways to write a Denavit-Hartenberg table, which a data sheet hardly ever names."""
-    if (other := CONFUSED.get(rig.arm.model)) is None:
-        return None
-    by_other = structs.replace(rig, arm=structs.replace(rig.arm, model=other))
-    return wrong_table(_drawn_flange(rig), _drawn_flange(by_other), other.value, witnesses)
-
-
 def impossible_rows(rig: Rig, samples: Samples) -> tuple[GrossError, ...]:
     """Rows that no instrument has to judge: copies, angles that the arm cannot have, and what shows nothing without."""
-    return _with_left_alone(samples, duplicated_rows(samples) + rows_beyond_limits(samples, _limits_rad(rig)))
+    return _with_left_alone(samples, duplicated_rows(samples) + rows_beyond_limits(samples, limits_rad(rig)))
 
 
 def _with_left_alone(samples: Samples, gross_errors: tuple[GrossError, ...]) -> tuple[GrossError, ...]:
     return gross_errors + left_alone(samples, gross_errors)
 
 
-def _limits_rad(rig: Rig) -> Floats:
-    return np.array([[j.lower_rad, j.upper_rad] for j in rig.arm.joints])
-
-
 def _sessions_apart(rig: Rig, samples: Samples) -> tuple[GrossError, ...]:
     if POSITION[0] not in samples:
         return ()
     rows, positions = _positions(samples)
-    flange = _drawn_flange(rig)(samples.joints()[rows])
+    flange = drawn_flange(rig)(samples.joints()[rows])
     return tuple(
         gross_error
         for theirs, point in by_target(rig, samples, rows)
@@ -185,9 +138,3 @@ def _positions(samples: Samples) -> tuple[NDArray[np.intp], Floats]:
     positions = np.stack([samples.column(c) for c in POSITION], axis=1)
     rows = np.flatnonzero(np.isfinite(positions[:, 0]))
     return rows, positions[rows]
-
-
-def _drawn_flange(rig: Rig) -> Callable[[Floats], Floats]:
-    """Angles (pose, joint) to (pose, 4, 4) of the nominal arm."""
-    arm = arm_of(rig)
-    return lambda q_rad: arm.flange(start_values(arm.parameters), q_rad)

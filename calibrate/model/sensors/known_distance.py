@@ -28,8 +28,8 @@ class KnownDistances:
     start_m: Mapping[int, Floats]  # point -> (3,) in the base
     axes: Mapping[int, Floats]  # point -> (3, 3) the axes as columns, in the base
     between: NDArray[np.int64]  # (row, 2) points
-    length_m: Floats  # (row,)
-    sigma_m: Floats  # (row,)
+    stated: Floats  # (row,) m
+    sigma: Floats  # (row,) m
 
     def __post_init__(self) -> None:
         unknown = set(self.between.ravel().tolist()) - set(self.start_m)
@@ -38,17 +38,22 @@ class KnownDistances:
 
     @property
     def rows(self) -> int:
-        return len(self.length_m)
+        return len(self.stated)
+
+    @property
+    def levers_m(self) -> Floats:
+        """(row,) over which a misfit of the readings shows in what is stated: none for a distance."""
+        return np.ones(self.rows)
 
     @property
     def log_det_noise(self) -> float:
         """Logarithm of the determinant of the covariance of all lengths."""
-        return 2.0 * float(np.sum(np.log(self.sigma_m)))
+        return 2.0 * float(np.sum(np.log(self.sigma)))
 
     def residual(self, theta: Floats) -> Floats:
-        return (self.spans_m(theta) - self.length_m) / self.sigma_m
+        return (self.spans(theta) - self.stated) / self.sigma
 
-    def spans_m(self, theta: Floats) -> Floats:
+    def spans(self, theta: Floats) -> Floats:
         """(row,) distances for values (param,)."""
         return np.linalg.norm(self._span(theta), axis=1)
 
@@ -60,10 +65,10 @@ class KnownDistances:
         for sign, ends in zip((-1.0, 1.0), self.between.T, strict=True):
             for row, point in enumerate(ends.tolist()):
                 out[row, points.index(point), :3] += sign * along[row] @ self.axes[point]
-        return out.reshape(self.rows, len(self.parameters)) / self.sigma_m[:, None]
+        return out.reshape(self.rows, len(self.parameters)) / self.sigma[:, None]
 
     def select(self, rows: NDArray[np.intp]) -> "KnownDistances":
-        return replace(self, between=self.between[rows], length_m=self.length_m[rows], sigma_m=self.sigma_m[rows])
+        return replace(self, between=self.between[rows], stated=self.stated[rows], sigma=self.sigma[rows])
 
     def _span(self, theta: Floats) -> Floats:
         """(row, 3) from one point to the other, in the base."""

@@ -47,11 +47,22 @@ class KnownPlanes:
         return np.full(self.rows, self.width, dtype=np.intp)
 
     @property
+    def levers_m(self) -> Floats:
+        """(row,) over which a misfit of the readings shows in what is stated: of an angle, the touched part."""
+        if not self.angles:
+            return np.ones(self.rows)
+        return np.array([min(self.extent_m[a], self.extent_m[b]) for a, b in self.between.tolist()])
+
+    @property
     def log_det_noise(self) -> float:
         return 2.0 * self.width * float(np.sum(np.log(self.sigma)))
 
     def residual(self, theta: Floats) -> Floats:
         return (self._misfit(theta) / self.sigma[:, None]).ravel()
+
+    def spans(self, theta: Floats) -> Floats:
+        """(row,) distances, m, from the middle of the second plane, or angles, rad, for values (param,)."""
+        return self._misfit(theta)[:, 0] + self.stated
 
     def jacobian(self, theta: Floats) -> Floats:
         steps = STEP * np.eye(len(theta))

@@ -13,7 +13,7 @@ from calibrate.diagnose.search.open_families import anything, fitted_curve, open
 from calibrate.diagnose.search.port_process import places_of, processes
 from calibrate.diagnose.search.score import removed
 from calibrate.diagnose.search.search import search
-from calibrate.diagnose.search.searching import holds
+from calibrate.diagnose.search.searching import Search, holds
 from calibrate.model.effects.curve import curve
 from calibrate.model.effects.ports import Place, Port
 from calibrate.model.effects.term import Accepted, Form, Missing, Shape
@@ -67,6 +67,28 @@ def test_the_size_of_an_unknown_cause_is_what_the_readings_show(world):
         assert size.sigma < 0.2 * size.value
         assert "depends on q3: shows as" in said[0].says
     assert within == 4
+
+
+@pytest.mark.parametrize(("step", "named"), [(6.0, True), (0.3, False)])
+def test_a_step_beside_an_unknown_drift_keeps_its_name_where_it_is_the_greater(world, step, named):
+    """A ball seated again while something creeps at the same place: no curve over time jumps."""
+    rng = np.random.default_rng(6)
+    session = world.session(rng)
+    t = session.drivers.t_s
+    slip = next(a for a in session.terms if a.physics == "encoder-slip" and a.port.where == "joint3.angle")
+    creep = Plain(slip.port, ("t",), Shape.SMOOTH, "unknown", joint=2, open=True)
+    middle = np.array([np.median(t)])
+    at = np.zeros((len(t), 4))
+    at[:, 2] = step * (t > middle[0]) + np.cos(2.0 * np.pi * t / t.max())
+    moved = world.with_readings(session, session.readings + np.einsum("nkj,nj->nk", session.lever, at))
+    fitted = moved.refitted([Accepted(slip, np.ones(1), middle), Accepted(creep, np.ones(6), np.zeros(0))])
+    both = Search(Bench(fitted), rng)
+    said = findings_of(both, [(), ()], np.ones(2))
+    assert [f.name.physics for f in said] == (["encoder-slip", "unknown"] if named else ["unknown"])
+    if named:
+        assert said[0].confidence == pytest.approx(0.95)
+        size = said[0].parameters["c0"]
+        assert abs(size.value - step) < 3.0 * size.sigma
 
 
 def test_names_that_balance_each_other_are_no_machine(world):

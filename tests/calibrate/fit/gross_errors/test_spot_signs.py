@@ -7,7 +7,7 @@ from acquisition.recording import Samples
 from acquisition.recording.rig import load_rig
 from calibrate.errors import DataError
 from calibrate.fit.identify.clean import mirrored_axes
-from calibrate.fit.identify.identify import refuse_wrong_file
+from calibrate.fit.identify.wrong_file import refuse_wrong_file
 from calibrate.model.checks.gross_error import GrossErrorKind
 
 SPOTS = ("psd1_x_m", "psd1_y_m", "psd2_x_m", "psd2_y_m")

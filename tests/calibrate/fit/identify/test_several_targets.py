@@ -10,7 +10,8 @@ from acquisition.recording.errors import SamplesError
 from acquisition.recording.rig.schema import FlangeTarget
 from acquisition.recording.sample_rules import checked_samples
 from calibrate.errors import DataError
-from calibrate.fit.identify.identify import identify, wrong_file
+from calibrate.fit.identify.identify import identify
+from calibrate.fit.identify.wrong_file import wrong_file
 from calibrate.fit.instruments import instruments_of
 from calibrate.model.arms.catalogue import arm_of
 from calibrate.model.parameters import start_values

@@ -15,6 +15,7 @@ from benchmarks.drawn_sessions import Bench, forward, reach
 from calibrate.errors import DataError
 from calibrate.fit.identify.identify import identify
 from calibrate.fit.identify.result import scale_alarms
+from calibrate.fit.identify.wrong_file import refuse_wrong_file
 from calibrate.model.sensors.known_planes import known_planes
 from calibrate.model.sensors.plane import best_planes
 
@@ -135,3 +136,27 @@ def test_a_face_that_leans_is_not_parallel():
     leaning[3] = 1e-3  # roll of plane 2: 50 um at its rms touch of 50 mm
     assert np.abs(distance.residual(leaning)).max() == pytest.approx(5.0, rel=1e-3)
     assert np.abs(distance.jacobian(np.zeros(9))[:, 3]).max() == pytest.approx(5e3, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("stated", "place"),
+    [
+        ({"known_distances": (KnownDistance(1, 2, 0.21, 2e-5, "plane"),)}, "known_distance"),
+        ({"known_angles": (KnownAngle(1, 2, 0.05, 1e-4),)}, "known_angle"),
+    ],
+)
+def test_what_the_touches_contradict_is_named_with_both_planes(stated, place):
+    rig, samples = touched(60)
+    right = msgspec.structs.replace(rig, known_distances=(BLOCK,), known_angles=(KnownAngle(1, 2, 0.0, 1e-4),))
+    refuse_wrong_file(right, samples)
+    with pytest.raises(DataError, match=f"{place}.*planes 1 and 2"):
+        refuse_wrong_file(msgspec.structs.replace(rig, **stated), samples)
+
+
+def test_a_touch_with_the_number_of_the_other_plane_is_left_out():
+    rig, samples = touched(120)
+    plane = samples.columns["plane"].copy()
+    plane[7] = 3.0 - plane[7]
+    wrong = Samples({**samples.columns, "plane": plane}, 6)
+    result = fitted(msgspec.structs.replace(rig, known_distances=(BLOCK,)), wrong)
+    assert [error.rows for error in result.blunders] == [(7,)]
