@@ -29,6 +29,7 @@ from benchmarks import (
     live_picture,
     log_cost,
     measuring_arm,
+    motion,
     plan_taken,
     proof_comparison,
     proof_misses,
@@ -121,6 +122,12 @@ def run_real() -> None:
     print("real recordings: unseen blocks by the model files of identify and diagnose")
     for row in real_diagnosis.lines(RIG.parents[2] / "shared" / "data"):
         print(row, flush=True)
+
+
+def run_motion() -> None:
+    print("torques of a real robot in motion: learned from record A, proved on record B, which no fit has seen")
+    for row in motion.lines(RIG.parents[2] / "shared" / "data" / "kr300-encoders"):
+        print(row)
 
 
 def run_sockets() -> None:
@@ -281,6 +288,7 @@ BENCHMARKS: dict[str, Callable[[], None]] = {
     "errors": run_errors,
     "designed_poses": run_designed_poses,
     "real": run_real,
+    "motion": run_motion,
     "sockets": run_sockets,
     "proof": run_proof,
     "diagnosis_speed": run_diagnosis_speed,

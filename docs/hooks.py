@@ -1,7 +1,7 @@
 """What MkDocs asks of the program: tables that would be wrong the day after if they were written by hand."""
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from mkdocs.exceptions import PluginError
@@ -11,6 +11,8 @@ from calibeam.cli import app
 from calibeam.command_list import COMMANDS
 from calibeam.simulation.mechanism_table import TABLE
 from calibrate.model.effects.catalogue import EFFECTS
+from calibrate.model.effects.kind import Kind
+from calibrate.model.effects.torque import TORQUES
 
 OPEN = "unknown"
 SHIM = "https://unpkg.com/iframe-worker/shim"  # which the theme names for pages that are opened from a folder
@@ -19,10 +21,19 @@ ROOT = Path(__file__).parents[1]
 
 def effects() -> str:
     """One row a physics; several files may tell of one."""
+    return _of_kinds(EFFECTS)
+
+
+def torques() -> str:
+    """One row a cause of torque."""
+    return _of_kinds(TORQUES)
+
+
+def _of_kinds(kinds: Sequence[Kind]) -> str:
     rows = ["| physics | what it is | easily mistaken for | source |", "|---|---|---|---|"]
     rows += [
         f"| `{e.physics}` | {e.explains} | {', '.join(f'`{name}`' for name in e.mistaken_for)} | {e.source} |"
-        for e in EFFECTS
+        for e in kinds
         if e.physics != OPEN
     ]
     return "\n".join(rows)
@@ -55,6 +66,7 @@ def _title(note: Path) -> str:
 
 TABLES: dict[str, Callable[[], str]] = {
     "effects": effects,
+    "torques": torques,
     "mechanisms": mechanisms,
     "commands": commands,
     "decisions": decisions,

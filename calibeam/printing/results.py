@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from rich.table import Table
 
 from calibeam.console import Console
-from calibrate.diagnose.record.schema import ClockRecord, DiagnosisFile, FindingRecord
+from calibrate.diagnose.record.schema import ClockRecord, DiagnosisFile, FindingRecord, TorquesRecord
 from calibrate.model.effects.term import with_sigma
 from calibrate.quantities import counted
 from calibrate.report.diagnosis import (
@@ -123,8 +123,24 @@ def print_streams(console: Console, file: DiagnosisFile) -> None:
         lines += [line for clock in file.streams.clocks for line in _clock(clock)]
         lines += [f"usual: {one.says}" for one in file.streams.usual]
         lines += [f"not tested: {says}" for says in file.streams.unseen]
-    for line in (*lines, *(f"next: {says}" for says in file.next)):
+    for line in lines:
         console.print(line, highlight=False, markup=False)
+    if file.torques is not None:
+        console.print(_torques(file.torques))
+        console.print(file.torques.made, highlight=False, markup=False)
+    for line in (*_unexplained(file), *(f"next: {says}" for says in file.next)):
+        console.print(line, highlight=False, markup=False)
+
+
+def _torques(found: TorquesRecord) -> Table:
+    table = Table(title="torque on the end of the motion, unseen (Nm rms)", title_justify="left")
+    for heading in ("joint", "moments", "torque", "links alone", "with the physics", "noise"):
+        table.add_column(heading, justify="right")
+    for one in found.joints:
+        sizes = (one.torque_nm, one.unseen_before_nm, one.unseen_after_nm, one.noise_nm)
+        cells = ["-" if size is None else f"{size:.3g}" for size in sizes]
+        table.add_row(str(one.joint), str(one.moments), *cells)
+    return table
 
 
 def _clock(clock: ClockRecord) -> Iterator[str]:
@@ -158,13 +174,17 @@ def _changes(file: DiagnosisFile) -> Iterator[str]:
 
 
 def _reasons_for_care(file: DiagnosisFile) -> Iterator[str]:
-    for one in (u for u in (file.unexplained, *file.also_unexplained) if u is not None):
-        where = f" at {one.where}" if one.where else ""
-        yield f"unexplained{where}: {one.says}"
+    yield from _unexplained(file)
     if file.free_space is not None:
         yield free_space_words(file.free_space)
     yield from stream_words(file)
     yield from missing_lines(file)[:MOST]
+
+
+def _unexplained(file: DiagnosisFile) -> Iterator[str]:
+    for one in (u for u in (file.unexplained, *file.also_unexplained) if u is not None):
+        where = f" at {one.where}" if one.where else ""
+        yield f"unexplained{where}: {one.says}"
 
 
 def _proof(file: DiagnosisFile) -> Table:

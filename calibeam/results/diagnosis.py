@@ -14,6 +14,7 @@ from calibeam.results.controller_findings import controller_notes
 from calibeam.software import SOFTWARE
 from calibrate.diagnose.assess import Verdict
 from calibrate.diagnose.from_recording import Diagnosed, diagnose_samples
+from calibrate.diagnose.motion import diagnose_torques, with_torques
 from calibrate.diagnose.new_poses import plan_of, separating
 from calibrate.diagnose.record.file import write_diagnosis
 from calibrate.diagnose.record.schema import (
@@ -83,7 +84,7 @@ def diagnose_streams(recording: Recording) -> DiagnosisFile:
         software=SOFTWARE,
         rig=RigRecord(recording.rig.name, rig_sha256(recording.rig_text)),
     )
-    file = with_streams(nothing, report)
+    file = with_torques(with_streams(nothing, report), diagnose_torques(recording, np.random.default_rng(SEED)))
     agree = file.verdict == Verdict.CONSISTENT.value
     return msgspec.structs.replace(file, verdict=Verdict.UNDECIDABLE.value) if agree else file
 

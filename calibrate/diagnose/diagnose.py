@@ -26,7 +26,7 @@ from calibrate.diagnose.search.noise_law import noise_law
 from calibrate.diagnose.search.searching import Search
 from calibrate.diagnose.stages import Stage, Stages
 from calibrate.diagnose.state.linearised import State
-from calibrate.model.effects.term import Missing
+from calibrate.model.effects.term import Accepted, Missing
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
@@ -43,8 +43,10 @@ def diagnose(
     missing: Sequence[Missing] = (),
     stages: Stages | None = None,
     known: Callable[[Diagnosis], None] | None = None,
+    usual: Sequence[Accepted] = (),
 ) -> Diagnosis:
     """Of a state with geometry fitted and no terms; `missing`: what effects of the catalogue lack in this record.
+    `usual` terms are there when the search begins, and go where nothing asks for them.
 
     `stages` keeps what fails; `known` is called once as soon as the causes are known, with nothing beside them yet.
     """
@@ -54,7 +56,7 @@ def diagnose(
         if known is not None:
             known(replace(_without_proof(found, missing), incomplete=stages.not_yet(Stage.PREDICTION)))
 
-    found = assessed(state, rng, missing, stages, causes)
+    found = assessed(state, rng, missing, stages, causes, usual)
     at, attempt = found.at, stages.attempt
     samples = np.unique(at.state.rows.sample[at.state.rows.data])
     wanders = attempt(Stage.NOISE, lambda: _wanders(at, rng), otherwise=False)

@@ -50,6 +50,8 @@ from acquisition.recording.files.bounds import (
 )
 from acquisition.recording.rig.devices import Devices
 
+Inertia = tuple[Number, Number, Number, Number, Number, Number]
+
 
 class ArmModel(enum.Enum):
     """How the fixed part of a link is written."""
@@ -105,10 +107,13 @@ class Joint(Struct, frozen=True, forbid_unknown_fields=True):
     origin_m: ArmVector | None = None
     rotation_rad: Rotation | None = None
     gear_ratio: GearRatio | None = None
+    rotor_inertia_kg_m2: Positive | None = None  # of rotor and gear, at the joint: times the square of the ratio
+    torque_per_ampere: Positive | None = None  # Nm at the joint, ratio of the gear included
     encoder_counts: Identity | None = None
     encoder_side: EncoderSide | None = None  # of the second encoder; None: not known
     mass_kg: Kilograms | None = None
     com_m: ArmVector | None = None
+    inertia_kg_m2: Inertia | None = None  # xx, yy, zz, xy, xz, yz about the centre of mass, in the axes of the link
     sign: Literal[-1, 1] = 1  # -1: the controller counts against the nominal axis; taken into the numbers (senses.py)
     follows: Follows | None = None  # angle from the link in front = reported angle + by * reported angle of that joint
 

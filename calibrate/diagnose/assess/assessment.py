@@ -90,13 +90,15 @@ def assessed(
     missing: Sequence[Missing] = (),
     stages: Stages | None = None,
     known: Callable[[Assessed], None] | None = None,
+    usual: Sequence[Accepted] = (),
 ) -> Assessed:
-    """Of a state with geometry fitted and no terms; `missing`: what effects of the catalogue lack in this record.
+    """Of a state with geometry fitted and no terms; `missing`: what effects of the catalogue lack in this record;
+    `usual`: terms that the search begins with.
 
     `stages` keeps what fails; `known` is called once as soon as the causes are known, before alternatives and sizes.
     """
     stages = Stages() if stages is None else stages
-    few = _found(state, rng, stages)
+    few = _found(state, rng, stages, usual)
     at = _of_all(few, state)
     if known is not None:
         known(Assessed(at, bare_findings(at), (), None, (), undecided=True))
@@ -129,10 +131,11 @@ def assessed(
     return Assessed(at, findings, unexplained, misfit, records(lacking), stages.undecided)
 
 
-def _found(state: State, rng: Generator, stages: Stages) -> Search:
+def _found(state: State, rng: Generator, stages: Stages, usual: Sequence[Accepted]) -> Search:
     """Every cause, of samples enough to see them; where a stage fails, what the stages before it have found."""
     few = stages.attempt(Stage.SEARCH, lambda: thinned(state, rng), state)
-    at = stages.attempt(Stage.SEARCH, lambda: search(few, rng), Search(Bench(few), rng))
+    begun = few.refitted(usual) if usual else few
+    at = stages.attempt(Stage.SEARCH, lambda: search(begun, rng), Search(Bench(few), rng))
     at = stages.attempt(Stage.UNKNOWN, lambda: with_unknowns(at), at)
     return stages.attempt(Stage.PREDICTION, lambda: _predicting(at), at)
 

@@ -94,6 +94,24 @@ class StreamsRecord(Record, frozen=True):
     unseen: Many[Sentence]
 
 
+class JointTorqueRecord(Record, frozen=True):
+    """Torques of one joint, Nm rms; what the model leaves on the end of the motion, which neither fit has seen."""
+
+    joint: Count
+    moments: Count
+    torque_nm: Statistic
+    noise_nm: Statistic
+    unseen_before_nm: Statistic | None
+    unseen_after_nm: Statistic | None
+
+
+class TorquesRecord(Record, frozen=True):
+    """What a motion shows beside the findings."""
+
+    made: Sentence
+    joints: Many[JointTorqueRecord]
+
+
 class UnexplainedRecord(Record, frozen=True):
     """Structure without a name."""
 
@@ -255,6 +273,7 @@ class DiagnosisFile(Record, frozen=True):
     changed: Many[ChangedRecord] = ()
     incomplete: Many[IncompleteRecord] = ()  # what could not be looked at, and why
     noise: Many[NoiseRecord] = ()
+    torques: TorquesRecord | None = None  # of a recording in motion
 
 
 def no_better_with_physics(file: DiagnosisFile) -> str:

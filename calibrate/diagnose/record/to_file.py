@@ -50,6 +50,7 @@ from calibrate.diagnose.state.fitted import Fitted
 from calibrate.model.checks.gross_error import GrossError
 from calibrate.model.effects.catalogue import EFFECTS
 from calibrate.model.effects.term import Form, Size
+from calibrate.model.effects.torque import TORQUES
 
 Floats = NDArray[np.float64]
 
@@ -87,7 +88,7 @@ def _with_physics(physics: Physics, rig: RigRecord, gross_errors: tuple[GrossErr
     judged = _judged(said)
     floor = next((f for f in said.floors if judged is not None and f.instrument == judged.instrument), None)
     after_m = None if judged is None else judged.rms_after_m
-    first, *others = [_unexplained(u, after_m) for u in said.unexplained] or [None]
+    first, *others = [unexplained_record(u, after_m) for u in said.unexplained] or [None]
     drivers, misfit, change = physics.geometry.drivers, said.lack_of_fit, physics.free_space
     bench, limits = Bench(physics.geometry), _limits(physics.model)
     stages = Stages(list(said.incomplete))
@@ -100,7 +101,7 @@ def _with_physics(physics: Physics, rig: RigRecord, gross_errors: tuple[GrossErr
         noise_floor_m=None if floor is None else _number(floor.rms_m),
         rms_before_m=None if judged is None else _number(judged.rms_before_m),
         rms_after_m=None if judged is None else _number(judged.rms_after_m),
-        findings=tuple(_finding(f, limits.get(f.name)) for f in said.findings),
+        findings=tuple(finding_record(f, limits.get(f.name)) for f in said.findings),
         unexplained=first,
         next=said.next,
         software=SOFTWARE,
@@ -143,7 +144,8 @@ def _limits(model: Fitted) -> dict[Named, float]:
     return {named(term): term.limit for term in known}
 
 
-def _finding(finding: Finding, plausible_to: float | None) -> FindingRecord:
+def finding_record(finding: Finding, plausible_to: float | None) -> FindingRecord:
+    """One cause as it is written."""
     return FindingRecord(
         *_words(finding.name),
         parameters={name: _size(size) for name, size in finding.parameters.items()},
@@ -154,7 +156,7 @@ def _finding(finding: Finding, plausible_to: float | None) -> FindingRecord:
         p=finding.p,
         bic_gain=finding.gain,
         held_out_gain=finding.predicts,
-        explains=next((e.explains for e in EFFECTS if e.physics == finding.name.physics), ""),
+        explains=next((e.explains for e in (*EFFECTS, *TORQUES) if e.physics == finding.name.physics), ""),
         plausible_to=plausible_to,
         curve=None if finding.pulled is None else _curve(finding.pulled, finding.name.where),
     )
@@ -169,7 +171,8 @@ def _curve(pulled: Pulled, where: str) -> CurveRecord:
     return CurveRecord(pulled.driver, unit, _numbers(pulled.values), _numbers(pulled.residual), _numbers(pulled.fitted))
 
 
-def _unexplained(found: Unexplained, rms_m: float | None) -> UnexplainedRecord:
+def unexplained_record(found: Unexplained, rms_m: float | None) -> UnexplainedRecord:
+    """Structure without a name as it is written; `rms_m` of what is left."""
     size = None if rms_m is None else _number(math.sqrt(max(found.share, 0.0)) * rms_m)
     return UnexplainedRecord(found.where, ",".join(found.depends_on), size, found.share, found.p, found.why)
 

@@ -18,6 +18,8 @@ ALPHA_FIRST = 0.03
 # for ALPHA_FIRST, too
 ALPHA_DRIFT = 0.05
 ALPHA_FURTHER = 0.01  # probability; of every further term, and of an effect without a name (doubts/unknown.py)
+# probability; of a term that no machine is without (friction), by the null of the whole catalogue
+ALPHA_USUAL = 0.1
 # count; ALPHA_FIRST and ALPHA_FURTHER are shared by fast and slow terms (Bonferroni), but for slow ones where noise
 # wanders: the law overstates the wander
 FAMILIES = 2

@@ -163,9 +163,12 @@ class _Felt:
     @classmethod
     def of(cls, bench: Bench, place: tuple[Port, int], shapes: Floats) -> "_Felt":
         rows, felt = bench.state.rows, lever(bench, *place)
-        mine = np.flatnonzero(rows.data)
-        by_sample = csr_matrix((felt[mine], (rows.sample[mine], mine)), shape=(shapes.shape[2], len(felt)))
-        return cls(shapes, by_sample)
+        mine, shape = np.flatnonzero(rows.data), (shapes.shape[2], len(felt))
+        if rows.earlier is None or rows.kept is None:
+            return cls(shapes, csr_matrix((felt[mine], (rows.sample[mine], mine)), shape=shape))
+        own, old = felt / (1.0 - rows.kept), np.flatnonzero(rows.earlier >= 0)
+        less = csr_matrix((rows.kept[old] * own[old], (rows.earlier[old], old)), shape=shape)
+        return cls(shapes, csr_matrix((own[mine], (rows.sample[mine], mine)), shape=shape) - less)
 
     def products(self, columns: Floats) -> Floats:
         """(curve, k, m) with columns (row, m)."""
@@ -176,8 +179,9 @@ class _Felt:
     @property
     def gram(self) -> Floats:
         """(curve, k, k)"""
-        square = np.asarray(self.lever.multiply(self.lever).sum(axis=1)).ravel()
-        return (self.shapes * square) @ np.swapaxes(self.shapes, 1, 2)
+        square = self.lever @ self.lever.T  # diagonal where every row follows one sample
+        felt = np.asarray(square @ self.shapes.reshape(-1, self.shapes.shape[2]).T)
+        return self.shapes @ np.moveaxis(felt.reshape(self.shapes.shape[2], *self.shapes.shape[:2]), 0, 1)
 
 
 def lever(bench: Bench, port: Port, component: int) -> Floats:

@@ -69,15 +69,18 @@ def without(at: Search, i: int) -> Search:
 def confirmed(at: Search) -> Search:
     """Each term against the null of the final residual; the least significant one goes first.
 
-    One null for all: what goes would be taken for noise that wanders in the next one, and take others with it.
+    One null for all: what goes would be taken for noise that wanders in the next one, and take others with it. What is
+    usual has a level of its own: nobody had to search for it.
     """
     null = null_at(at.bench, at.rng) if at.state.accepted else None
     while null is not None and at.state.accepted:
         p = {a.term.key: p_of(at.bench, null, i) for i, a in enumerate(at.state.accepted)}
         at = replace(at, p=p)
-        values = np.array([p[a.term.key] for a in at.state.accepted])
+        usual = np.array([a.term.key in at.usual for a in at.state.accepted])
+        alpha = np.where(usual, limits.ALPHA_USUAL, limits.ALPHA_FURTHER if len(usual) > 1 else limits.ALPHA_FIRST)
+        values = np.array([p[a.term.key] for a in at.state.accepted]) / alpha
         worst = int(np.argmax(values))
-        if values[worst] <= (limits.ALPHA_FURTHER if len(values) > 1 else limits.ALPHA_FIRST):
+        if values[worst] <= 1.0:
             return at
         at = without(at, worst)
     return at

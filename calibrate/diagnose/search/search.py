@@ -98,8 +98,11 @@ def _groups(at: Search) -> list[Group]:
 
 
 def search(state: State, rng: Generator) -> Search:
-    """All closed terms that beat the null of the whole catalogue, in a model in which each one is needed."""
-    return settled(grown_out(Search(Bench(state), rng)))
+    """All closed terms that beat the null of the whole catalogue, in a model in which each one is needed.
+
+    Those that the state begins with are usual ones.
+    """
+    return settled(grown_out(Search(Bench(state), rng, usual=frozenset(a.term.key for a in state.accepted))))
 
 
 def settled(at: Search) -> Search:

@@ -30,6 +30,7 @@ class Search:
     rng: Generator
     banned: frozenset[Key] = field(default_factory=frozenset)  # refits have refused them
     p: dict[Key, float] = field(default_factory=dict)  # family-wise, of every accepted term
+    usual: frozenset[Key] = field(default_factory=frozenset)  # nobody had to search for them: no machine is without
 
     @property
     def state(self) -> State:

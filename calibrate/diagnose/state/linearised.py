@@ -30,6 +30,10 @@ class WhitenedRows:
     instrument: Ints  # (row,) index of the instrument, -1 prior rows
     owner: Ints  # (param,) of geometry: index in State.accepted whose value it is, -1: geometry proper
     stated: Ints = field(default_factory=lambda: np.zeros(0, dtype=np.intp))  # rows of what a known model states
+    earlier: Ints | None = (
+        None  # (row,) sample of the reading that was taken out of this row, -1: none; None: of no row
+    )
+    kept: Floats | None = None  # (row,) share in which it was
 
     @property
     def data(self) -> NDArray[np.bool_]:

@@ -17,7 +17,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 COMMAND, JOINTS, ENCODERS, CURRENTS = "target_q_rad", "actual_q_rad", "position_rad", "photocurrent_a"
-JOINT_TORQUE, MOTOR_TORQUE = "joint_torque_nm", "motor_torque_nm"
+JOINT_TORQUE, MOTOR_TORQUE, CURRENT = "joint_torque_nm", "motor_torque_nm", "actual_current_a"
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,12 +88,21 @@ def _of_some_joints(device: StreamDevice | None) -> StreamDevice | None:
 
 
 def _torque(recording: Recording) -> StreamDevice | None:
-    """In Nm at the joint. Of motors by the gear ratios of the rig file; a joint that has none is left out."""
-    device = _of(recording, JOINT_TORQUE, "torque")
-    if device is None and (device := _of(recording, MOTOR_TORQUE, "torque")) is not None:
-        arm = recording.rig.arm
-        ratios = [joint.gear_ratio or np.nan for joint in arm.joints]
-        device = replace(device, track=replace(device.track, values=device.track.values * np.array(ratios)))
+    """In Nm at the joint. Of motors by the gear ratios of the rig file, of currents by its torques per ampere; a joint
+    that has none is left out.
+    """
+    joints = recording.rig.arm.joints
+    for channel, ratios in (
+        (JOINT_TORQUE, [1.0] * len(joints)),
+        (MOTOR_TORQUE, [joint.gear_ratio or np.nan for joint in joints]),
+        (CURRENT, [joint.torque_per_ampere or np.nan for joint in joints]),
+    ):
+        device = _of(recording, channel, "torque")
+        if device is not None and device.track.channels == len(joints) and np.isfinite(ratios).any():
+            device = replace(device, track=replace(device.track, values=device.track.values * np.array(ratios)))
+            break
+    else:
+        return None
     device = _of_some_joints(device)
     return None if device is None else replace(device, track=replace(device.track, unit="Nm"))
 

@@ -20,6 +20,7 @@ LEAST_LEVELS = 4  # different values that a curve needs
 SLOW = ("t", "temp_")
 BOX = 1.3  # of the half range: eigenfunctions vanish at the edge of the box, data do not
 UNKNOWN = "unknown"
+TORQUE = ".torque"  # what a port of one joint's torque ends with
 WIDTHS = {Place.FRAME: 6, Place.SURROUNDINGS: 6}
 
 
@@ -54,14 +55,15 @@ def cause(drivers: Drivers, name: str) -> Floats:
 def acts_at(name: str, where: str) -> bool:
     """Whether a driver could act at a port: how a joint moved matters at that joint."""
     stem = name.rstrip("0123456789")
-    if stem not in ("last_move", "qd", "cmd_minus_q"):
+    if stem not in ("last_move", "qd", "qdd", "tau", "cmd_minus_q"):
         return True
-    return where == f"joint{name[len(stem) :]}.angle"
+    return where.startswith(f"joint{name[len(stem) :]}.")
 
 
 def _names(drivers: Drivers) -> list[str]:
     joints = range(1, drivers.n_joints + 1)
-    names = ["t", *(f"q{i}" for i in joints), *(f"last_move{i}" for i in joints)]
+    names = ["t"] if drivers.clock_is_a_cause else []
+    names += [*(f"q{i}" for i in joints), *(f"last_move{i}" for i in joints)]
     if drivers.qd_rad_s is not None:
         names += [f"qd{i}" for i in joints]
     if drivers.cmd_minus_q_rad is not None:
@@ -128,7 +130,9 @@ class SmoothCurve(Term):
 
 
 def unit_of(port: Port, component: int) -> str:
-    """Of a component of a port: rad or m."""
+    """Of a component of a port: rad or m, or nm of a torque."""
+    if port.where.endswith(TORQUE):
+        return "nm"
     rotates = port.place is Place.JOINTS or (port.place in WIDTHS and component >= 3)
     return "rad" if rotates else "m"
 

@@ -75,6 +75,11 @@ class Drivers(Conditions):
     readouts: Mapping[str, Readout]
     session_rows: int | None = None  # where others stand behind: their number must not change what a basis means
 
+    @property
+    def clock_is_a_cause(self) -> bool:
+        """Whether a curve over time says anything: in one motion everything is some function of time."""
+        return True
+
     def of_session(self, values: Values) -> Values:
         """Those of values (pose, ...) that means, largest values and ranges are taken of."""
         return values[: self.session_rows]

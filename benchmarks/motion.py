@@ -1,0 +1,139 @@
+"""A real robot in motion, KUKA KR 300: learned from one recording, proved on another that no fit has seen.
+
+Beside the diagnosis plain least squares of links, rotors, dry and viscous friction of every joint, as in textbooks.
+No mass of this robot is published; nothing of the second recording is fitted.
+"""
+
+import contextlib
+import csv
+import io
+import tempfile
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition.recording import Recording, read
+from calibeam.cli import run
+from calibrate.diagnose.motion.motion_table import motion_of
+from calibrate.diagnose.motion.torque_state import TorqueState, with_torque
+from calibrate.diagnose.motion.torques import TorqueDiagnosis, diagnose_torques, torque_state, usual_friction
+
+Floats = NDArray[np.float64]
+
+COLUMNS = (
+    "se1_deg..se3_deg [deg] = enc, motor1_deg..motor6_deg [deg] = q, ref1_deg..ref6_deg [deg] = cmd, "
+    "torque1_motor_Nm..torque6_motor_Nm [Nm] = motor_tau"
+)
+# a_m, alpha in right angles, d_m, theta in right angles: KR 300 R2500 ultra, KUKA's data sheet
+TABLE = (
+    *((0.35, -1, 0.675, 0), (1.15, 0, 0.0, -1), (-0.041, -1, 0.0, 0)),
+    *((0.0, 1, 1.0, 0), (0.0, -1, 0.0, 0), (0.0, 0, 0.24, 0)),
+)
+RIGHT_RAD = 1.5707963267948966
+RATIOS = 1  # row of parameters.csv
+HEAD = "| joint | torque of B | model of A | least squares on A | friction of A | friction of B | of the authors |"
+SEED = 1
+
+
+def rig_of(folder: Path, out: Path) -> Path:
+    """The rig file of the recorded robot, written into a folder."""
+    with (folder / "parameters.csv").open(encoding="utf-8") as file:
+        ratios = list(map(float, list(csv.reader(file))[RATIOS][1:]))
+    joints = [
+        f"[[arm.joint]]\na_m = {a}\nalpha_rad = {al * RIGHT_RAD}\nd_m = {d}\ntheta_offset_rad = {th * RIGHT_RAD}\n"
+        f"lower_rad = -3.2\nupper_rad = 3.2\ngear_ratio = {ratio}\n"
+        for (a, al, d, th), ratio in zip(TABLE, ratios, strict=True)
+    ]
+    rig = out / "rig.toml"
+    rig.write_text('schema = 1\nname = "kr300"\n[arm]\nmodel = "dh"\n' + "\n".join(joints), encoding="utf-8")
+    return rig
+
+
+def recording_of(folder: Path, record: str, out: Path) -> Recording:
+    """Record A or B as the command line imports it. ValueError where it does not."""
+    rig, path = rig_of(folder, out), out / f"{record}.mcap"
+    source = str(folder / f"recorded_{record}.csv")
+    command = ["import", source, "--streams", "--rig", str(rig), "--yes", "--columns", COLUMNS, "--out", str(path)]
+    with contextlib.redirect_stdout(io.StringIO()):
+        refused = run(command)
+    if refused:
+        raise ValueError(f"{source}: not imported")
+    return read(path)
+
+
+def diagnosed(recording: Recording) -> TorqueDiagnosis:
+    """ValueError where the recording shows no torques."""
+    found = diagnose_torques(recording, np.random.default_rng(SEED))
+    if found is None:
+        raise ValueError(f"{recording.path}: no torques in motion")
+    return found
+
+
+def left_nm(model: TorqueState, other: Recording) -> tuple[Floats, Floats]:
+    """Of each joint of a recording that the model has not seen: rms of its torque, and of what the model leaves."""
+    unseen = seen_as_links(other).whole
+    drivers = with_torque(unseen.drivers, model.links)
+    problem = replace(unseen, terms=model.problem.terms, sizes=model.problem.sizes, drivers=drivers)
+    return _rms(problem.joint, problem.observed_nm), _rms(problem.joint, problem.misfit_nm(model.theta))
+
+
+def seen_as_links(recording: Recording) -> TorqueState:
+    """With the links alone. ValueError where the recording shows no torques."""
+    motion = motion_of(recording)
+    if motion is None:
+        raise ValueError(f"{recording.path}: no torques in motion")
+    return torque_state(recording.rig, motion)
+
+
+def least_squares(recording: Recording) -> TorqueState:
+    """Links, rotors and the usual friction, every joint by the spread of its torque, in one step without weights."""
+    bare = seen_as_links(recording)
+    full = bare.refitted(usual_friction(bare))
+    problem = full.problem
+    scale = 1.0 / _rms(problem.joint, problem.observed_nm)[problem.joint]
+    terms = [problem.felt(a.term.basis(problem.drivers, a.inner)) for a in full.accepted]
+    columns = np.concatenate([problem.columns, *terms], axis=1) * scale[:, None]
+    size = np.maximum(np.linalg.norm(columns, axis=0), 1e-12)
+    theta = np.linalg.lstsq(columns / size, problem.observed_nm * scale, rcond=1e-9)[0] / size
+    return replace(full, theta=theta)
+
+
+def lines(folder: Path) -> Iterator[str]:
+    """A line a joint; one line that says so where the recording is not there."""
+    if not folder.is_dir():
+        yield f"skipped: no folder {folder.name}; the real recordings are not part of the project"
+        return
+    with tempfile.TemporaryDirectory() as work:
+        a, b = (recording_of(folder, record, Path(work)) for record in "AB")
+    of_a, of_b = diagnosed(a), diagnosed(b)
+    torque, left = left_nm(of_a.model, b)
+    _, plain = left_nm(least_squares(a), b)
+    authors = _authors(folder)
+    yield of_a.motion.made
+    yield HEAD
+    yield "|" + "---|" * (HEAD.count("|") - 1)
+    for j in range(len(torque)):
+        shares = " | ".join(f"{100 * one[j] / torque[j]:.1f} %" for one in (left, plain))
+        friction = " | ".join(_friction(one, j + 1) for one in (of_a, of_b))
+        yield f"| {j + 1} | {torque[j]:.0f} Nm | {shares} | {friction} | {authors[j]} |"
+
+
+def _friction(found: TorqueDiagnosis, joint: int) -> str:
+    mine = [f for f in found.diagnosis.findings if f.name.where == f"joint{joint}.torque"]
+    each = (next(iter(f.parameters.items())) for f in mine if "friction" in f.name.physics)
+    units = {"friction_nm": "Nm", "friction_nms_per_rad": "Nms"}
+    return ", ".join(f"{size.value:.0f} ± {size.sigma:.0f} {units.get(name, name)}" for name, size in sorted(each))
+
+
+def _authors(folder: Path) -> list[str]:
+    with (folder / "parameters.csv").open(encoding="utf-8") as file:
+        rows = {row[0]: row[1:] for row in csv.reader(file)}
+    each = zip(rows["f_coul"], rows["f_a"], rows["f_vis"], strict=True)
+    return [f"{float(coul) + float(a):.0f} Nm, {float(vis):.0f} Nms" for coul, a, vis in each]
+
+
+def _rms(joint: NDArray[np.intp], values: Floats) -> Floats:
+    return np.asarray(np.sqrt(np.bincount(joint, values**2) / np.bincount(joint)))

@@ -1,0 +1,6 @@
+"""A recording in motion: what its joints' torques hold beside rigid links."""
+
+from calibrate.diagnose.motion.torque_record import with_torques
+from calibrate.diagnose.motion.torques import TorqueDiagnosis, diagnose_torques
+
+__all__ = ["TorqueDiagnosis", "diagnose_torques", "with_torques"]

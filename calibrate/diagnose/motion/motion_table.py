@@ -1,0 +1,159 @@
+"""Moments of a recorded motion: angles, speeds, accelerations and torques of the joints, all through one low pass.
+
+Speed and acceleration are slopes of the recorded angles behind a zero-phase low pass; the torque passes the same one,
+so that what is linear in it loses nothing (parallel filtering: Gautier, Dynamic identification of robots with power
+model, ICRA 1997). Rows stand as far apart as the low pass makes them independent.
+
+Where a joint stands or turns back, friction is anything between its two senses: its torque there is left out.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition.recording import Recording
+from calibrate.diagnose.streams import devices_of
+from calibrate.diagnose.streams.track import SIGMA_OF_MEDIAN
+
+Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+BAND_HZ = 20.0  # below the first resonance of a geared arm there is motion, above it vibration and noise
+RATE_OVER_BAND = 5.0  # slower logs are filtered at a fifth of their rate
+ORDER = 4  # of the low pass, run both ways
+MOST_ROWS = 600  # of six torques: more cost time and show hardly more
+FEWEST_ROWS = 60
+LEAST_RUN_S = 1.0  # without a gap
+EDGE_PERIODS = 2.0  # of the band, that are left out at the ends of a run
+STILL_SHARE = 0.02  # of a joint's greatest speed; below it is taken to stand
+STILL_SIGMAS = 4.0
+TEMPERATURE = "joint_temperature_degC"
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """Rows are moments. NaN torque: the joint stands, turns back, or has none recorded."""
+
+    time_s: Floats  # (moment,) on the clock of the joints
+    q_rad: Floats  # (moment, joint)
+    qd_rad_s: Floats  # (moment, joint)
+    qdd_rad_s2: Floats  # (moment, joint)
+    torque_nm: Floats  # (moment, joint)
+    still_rad_s: Floats  # (joint,)
+    temperature_degC: Floats | None  # (moment, joint)
+    band_hz: float
+    speed_sigma_rad_s: Floats  # (joint,) that the noise of the angles leaves
+    acceleration_sigma_rad_s2: Floats  # (joint,)
+
+    @property
+    def made(self) -> str:
+        """How speed and acceleration were made, in a sentence."""
+        speed, acceleration = 1e3 * self.speed_sigma_rad_s.max(), self.acceleration_sigma_rad_s2.max()
+        return (
+            "speeds and accelerations are slopes of the joint angles behind a zero-phase low pass of "
+            f"{self.band_hz:g} Hz (noise: up to {speed:.2g} mrad/s and {acceleration:.2g} rad/s²); "
+            f"{len(self.time_s)} moments"
+        )
+
+
+def motion_of(recording: Recording) -> Motion | None:
+    """None without joint angles and torques of one and the same time, or where they are too few."""
+    devices = devices_of(recording)
+    joints, torque = devices.get("joints"), devices.get("torque")
+    n = recording.rig.n_joints
+    if joints is None or torque is None or joints.track.channels != n or n == 0:
+        return None
+    period_s = joints.track.period_s
+    if not np.isfinite(period_s) or period_s <= 0.0:
+        return None
+    band_hz = min(BAND_HZ, 1.0 / period_s / RATE_OVER_BAND)
+    torques, there = torque.track, np.full(n, -1)
+    there[[torques.joint(k) - 1 for k in range(torques.channels)]] = np.arange(torques.channels)
+    first = max(joints.track.time_s[0], torques.time_s[0])
+    time_s = np.arange(first, min(joints.track.time_s[-1], torques.time_s[-1]), period_s)
+    q_rad, torque_nm = joints.track.curve.at(time_s), torques.curve.at(time_s)[:, there]
+    torque_nm[:, there < 0] = np.nan
+    whole = np.all(np.isfinite(q_rad), axis=1) & np.all(np.isfinite(torque_nm[:, there >= 0]), axis=1)
+    runs = [_filtered(time_s[run], q_rad[run], torque_nm[run], band_hz, period_s) for run in _runs(whole, period_s)]
+    return _thinned(runs, recording, band_hz, period_s) if runs else None
+
+
+@dataclass(frozen=True, eq=False)
+class _Run:
+    """At every sample of a stretch without gap: (sample, joint) each."""
+
+    time_s: Floats
+    q_rad: Floats
+    qd_rad_s: Floats
+    qdd_rad_s2: Floats
+    torque_nm: Floats
+    noise_rad: Floats  # (joint,) of one reading of an angle
+
+
+def _runs(whole: Flags, period_s: float) -> list[NDArray[np.intp]]:
+    rows = np.flatnonzero(whole)
+    parts = np.split(rows, 1 + np.flatnonzero(np.diff(rows) > 1))
+    return [part for part in parts if len(part) * period_s >= LEAST_RUN_S]
+
+
+def _filtered(time_s: Floats, q_rad: Floats, torque_nm: Floats, band_hz: float, period_s: float) -> _Run:
+    smooth = _low_pass(q_rad, band_hz, period_s)
+    speed = np.gradient(smooth, period_s, axis=0)
+    noise = SIGMA_OF_MEDIAN * np.median(np.abs(q_rad - smooth), axis=0)
+    acceleration, torque = np.gradient(speed, period_s, axis=0), torque_nm.copy()
+    measured = np.isfinite(torque_nm).all(axis=0)
+    torque[:, measured] = _low_pass(torque_nm[:, measured], band_hz, period_s)
+    edge = round(EDGE_PERIODS / band_hz / period_s)
+    inside = slice(edge, len(time_s) - edge)
+    return _Run(time_s[inside], smooth[inside], speed[inside], acceleration[inside], torque[inside], noise)
+
+
+def _low_pass(values: Floats, band_hz: float, period_s: float) -> Floats:
+    from scipy.signal import butter, sosfiltfilt  # a diagnosis of poses starts sooner without
+
+    sections = butter(ORDER, 2.0 * band_hz * period_s, output="sos")
+    return np.asarray(sosfiltfilt(sections, values, axis=0), dtype=np.float64)
+
+
+def _thinned(runs: list[_Run], recording: Recording, band_hz: float, period_s: float) -> Motion | None:
+    speed, acceleration = _gains(band_hz, period_s)
+    noise = np.max([run.noise_rad for run in runs], axis=0)
+    fastest = np.max([np.abs(run.qd_rad_s).max(axis=0) for run in runs], axis=0)
+    still = np.maximum(STILL_SHARE * fastest, STILL_SIGMAS * speed * noise) + 1e-9
+    step = max(1, round(0.5 / band_hz / period_s), -(-sum(len(run.time_s) for run in runs) // MOST_ROWS))
+    parts = [_rows(run, still, round(0.5 / band_hz / period_s), step) for run in runs]
+    time_s, q, qd, qdd, torque = (np.concatenate(each) for each in zip(*parts, strict=True))
+    if len(time_s) < FEWEST_ROWS or not np.isfinite(torque).any():
+        return None
+    heat = _temperatures(recording, time_s, q.shape[1])
+    return Motion(time_s, q, qd, qdd, torque, still, heat, band_hz, speed * noise, acceleration * noise)
+
+
+def _rows(run: _Run, still: Floats, window: int, step: int) -> tuple[Floats, ...]:
+    """Every `step`-th sample; torques of joints that stand or turn back within `window` samples are NaN."""
+    sense = np.where(np.abs(run.qd_rad_s) < still, 0.0, np.sign(run.qd_rad_s))
+    steady = sense != 0.0
+    for shift in range(1, window + 1):
+        steady[shift:] &= sense[shift:] == sense[:-shift]
+        steady[:-shift] &= sense[:-shift] == sense[shift:]
+    torque = np.where(steady, run.torque_nm, np.nan)
+    return tuple(part[::step] for part in (run.time_s, run.q_rad, run.qd_rad_s, run.qdd_rad_s2, torque))
+
+
+def _gains(band_hz: float, period_s: float) -> tuple[float, float]:
+    """Sigma of speed (1/s) and acceleration (1/s²) for independent noise of 1 on every angle."""
+    impulse = np.zeros(2 * round(10.0 / band_hz / period_s) + 1)
+    impulse[len(impulse) // 2] = 1.0
+    speed = np.gradient(_low_pass(impulse, band_hz, period_s), period_s)
+    return float(np.linalg.norm(speed)), float(np.linalg.norm(np.gradient(speed, period_s)))
+
+
+def _temperatures(recording: Recording, time_s: Floats, n: int) -> Floats | None:
+    """(moment, joint) on the clock of the joints' device; None where it did not read any."""
+    for stream in recording.streams.values():
+        if TEMPERATURE in stream.values and len(stream.device_s) > 1:
+            values = np.asarray(stream.values[TEMPERATURE], dtype=float).reshape(len(stream.device_s), -1)
+            if values.shape[1] == n and np.isfinite(values).all():
+                return np.stack([np.interp(time_s, stream.device_s, column) for column in values.T], axis=1)
+    return None

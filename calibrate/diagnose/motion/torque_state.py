@@ -1,0 +1,219 @@
+"""Torques of a motion with links and terms fitted together: a State of calibrate/diagnose/state/linearised.py.
+
+Weights and least squares take turns under Student's t law, each joint with a size of noise of its own, as in the fit of
+poses (calibrate/fit/noise, calibrate/fit/solvers).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calibrate.diagnose import limits
+from calibrate.diagnose.motion.torque_problem import TorqueProblem, plain_sizes
+from calibrate.diagnose.state.linearised import UnseenMisfits, WhitenedRows
+from calibrate.fit.noise import Scatter, likelihood_of, scatter_of
+from calibrate.fit.solvers import NEAR_START, solve
+from calibrate.model.effects.term import Accepted, Term
+from calibrate.model.effects.torque import MotionDrivers, torque_terms
+from calibrate.model.parameters import plausible_sizes, priors, start_values
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.intp]
+
+FEWEST_NEIGHBOURS = 20  # data of a joint, for the memory of its noise
+NEAR = 1.5  # times the least gap: data that are neighbours
+MOST_ALONG = 0.99  # of the noise, from one datum to the next
+LEAST_MEMORY_S = 1e-3
+MOST_MEMORY_S = 0.1  # what lasts longer than vibration and ripple follows the motion: it is no noise
+
+
+@dataclass(frozen=True, eq=False)
+class TorqueState:
+    """`problem` holds the data that the fit sees; `whole` all of them, under the same weights where both have them."""
+
+    whole: TorqueProblem
+    active: Ints  # moments that the fit sees, sorted
+    problem: TorqueProblem
+    theta: Floats  # of the problem's parameters
+    minus_two_log_likelihood: float
+
+    @property
+    def accepted(self) -> tuple[Accepted, ...]:
+        return self.problem.split(self.theta)[1]
+
+    @property
+    def links(self) -> Floats:
+        """(link number,)"""
+        return self.problem.split(self.theta)[0]
+
+    @property
+    def samples(self) -> int:
+        return len(self.active)
+
+    @property
+    def distrusted(self) -> int:
+        return int(np.sum(self.problem.weights < limits.DISTRUSTED_WEIGHT))
+
+    @property
+    def drivers(self) -> MotionDrivers:
+        return self.problem.drivers
+
+    def trusting(self) -> Self:
+        return replace(self, problem=replace(self.problem, weights=np.ones_like(self.problem.weights)))
+
+    @property
+    def rows(self) -> WhitenedRows:
+        return self._rows
+
+    @cached_property
+    def _rows(self) -> WhitenedRows:
+        problem, parameters = self.problem, self.problem.parameters
+        free = np.flatnonzero([p.free for p in parameters])
+        with_prior = free[np.isfinite(priors(parameters)[free])]
+        unit, sigma = plausible_sizes(parameters), priors(parameters)
+        held = np.zeros((len(with_prior), len(free)))
+        held[range(len(with_prior)), np.searchsorted(free, with_prior)] = unit[with_prior] / sigma[with_prior]
+        none = np.full(len(with_prior), -1, dtype=np.intp)
+        data = np.arange(len(problem.moment))
+        away = (self.theta - start_values(parameters))[with_prior] / sigma[with_prior]
+        return WhitenedRows(
+            np.concatenate([-problem.residual(self.theta), -away]),
+            np.concatenate([problem.jacobian(self.theta)[:, free] * unit[free], held]),
+            np.concatenate([problem.moment, none]),
+            np.concatenate([data, none]),
+            np.concatenate([problem.joint, none]),
+            problem.owner[free],
+            earlier=np.concatenate([np.where(problem.kept > 0.0, problem.moment[problem.before], -1), none]),
+            kept=np.concatenate([problem.kept, np.zeros(len(with_prior))]),
+        )
+
+    def columns(self, term: Term, inner: Floats) -> Floats:
+        felt = self.problem.whitened(self.problem.felt(term.basis(self.drivers, inner)))
+        return np.concatenate([felt, np.zeros((len(self.rows.residual) - len(felt), felt.shape[1]))])
+
+    def columns_at(self, term: Term, inner: Sequence[Floats]) -> Floats:
+        return np.stack([self.columns(term, one).T for one in inner])
+
+    def candidates(self) -> Sequence[Term]:
+        return self._candidates
+
+    @cached_property
+    def _candidates(self) -> tuple[Term, ...]:
+        return torque_terms(self.drivers)
+
+    def refitted(self, accepted: Sequence[Accepted]) -> "TorqueState":
+        terms = tuple(accepted)
+        problem = replace(self.problem, terms=terms, sizes=plain_sizes(self.problem, terms))
+        values = [a.values for a in terms]
+        return _settled(self, problem, np.concatenate([self.links, *values]))
+
+    def renewed(self) -> "TorqueState":
+        """With the torque of the links as now fitted."""
+        drivers = with_torque(self.drivers, self.links)
+        whole, problem = replace(self.whole, drivers=drivers), replace(self.problem, drivers=drivers)
+        return _settled(replace(self, whole=whole), problem, self.theta)
+
+    def select(self, samples: Ints) -> Self:
+        chosen = np.sort(samples)
+        problem = part_of(self.problem, np.isin(self.problem.moment, chosen))
+        value, _ = _likelihood(problem, problem.misfit_nm(self.theta))
+        return replace(self, active=chosen, problem=problem, minus_two_log_likelihood=value)
+
+    def held_out(self, samples: Ints) -> tuple[UnseenMisfits, ...]:
+        mine = np.isin(self.whole.moment, samples)
+        unseen = replace(part_of(self.whole, mine), terms=self.problem.terms, sizes=self.problem.sizes)
+        misfit = -unseen.misfit_nm(self.theta)
+        each = ((j, np.flatnonzero(unseen.joint == j)) for j in range(self.drivers.n_joints))
+        return tuple(
+            UnseenMisfits(
+                f"joint{j + 1}.torque",
+                unseen.moment[rows],
+                misfit[rows, None],
+                misfit[rows, None] / self.problem.sigma_nm[j],
+            )
+            for j, rows in each
+            if len(rows)
+        )
+
+
+def _settled(state: TorqueState, problem: TorqueProblem, start: Floats) -> TorqueState:
+    """Turns of weights and least squares until the likelihood rests."""
+    theta, last, out = start, np.inf, state
+    for _ in range(limits.FIT_TURNS):
+        fit = solve(problem, start=theta, damping=NEAR_START, max_steps=limits.SOLVER_STEPS, tolerance=0.02)
+        theta = fit.theta
+        problem, value = with_noise(problem, theta)
+        away = (theta - start_values(problem.parameters)) / priors(problem.parameters)
+        value += float(away[: len(problem.links)] @ away[: len(problem.links)])
+        out = replace(state, problem=problem, theta=theta, minus_two_log_likelihood=value)
+        if abs(last - value) < limits.SETTLED:
+            break
+        last = value
+    return out
+
+
+def part_of(problem: TorqueProblem, kept: NDArray[np.bool_]) -> TorqueProblem:
+    """Some of the data."""
+    cut = {name: getattr(problem, name)[kept] for name in ("columns", "observed_nm", "moment", "joint", "weights")}
+    return replace(problem, **cut)
+
+
+def with_noise(problem: TorqueProblem, theta: Floats) -> tuple[TorqueProblem, float]:
+    """Under the noise that these values leave, and -2 log likelihood; what the fit has taken is given back."""
+    misfit, n = problem.misfit_nm(theta), problem.drivers.n_joints
+    memory = np.array([_memory_s(problem, misfit, j) for j in range(n)])
+    plain = replace(problem, memory_s=memory, sigma_nm=np.ones(n), weights=np.ones(len(misfit)))
+    new, larger = plain.whitened(misfit), _freedom(problem, theta)
+    sigma, weights = problem.sigma_nm.copy(), np.ones(len(misfit))
+    for j in range(n):
+        rows = np.flatnonzero(problem.joint == j)
+        if len(rows):
+            own = np.full((len(rows), 1), float(np.std(new[rows])) + 1e-12)
+            found: Scatter = scatter_of(new[rows, None], np.zeros((len(rows), 1, 1)), own)
+            sigma[j] = float(np.sqrt(found.covariance[0, 0, 0] * larger[j]))
+            weights[rows] = found.weights
+    out = replace(problem, memory_s=memory, sigma_nm=sigma, weights=weights)
+    return out, _likelihood(out, misfit)[0]
+
+
+def _memory_s(problem: TorqueProblem, misfit: Floats, joint: int) -> float:
+    """From neighbours as near as they come; robust weights keep single gross errors from hiding it."""
+    rows = np.flatnonzero((problem.joint == joint) & np.isfinite(problem.gap_s))
+    if len(rows) < FEWEST_NEIGHBOURS:
+        return LEAST_MEMORY_S
+    near = rows[problem.gap_s[rows] < NEAR * np.min(problem.gap_s[rows])]
+    w, one, two = problem.weights[near], misfit[near], misfit[problem.before[near]]
+    along = float(np.sum(w * one * two)) / max(float(np.sum(w * (one**2 + two**2))) / 2.0, 1e-300)
+    gap = float(np.mean(problem.gap_s[near]))
+    return float(np.clip(-gap / np.log(np.clip(along, 1e-6, MOST_ALONG)), LEAST_MEMORY_S, MOST_MEMORY_S))
+
+
+def _freedom(problem: TorqueProblem, theta: Floats) -> Floats:
+    """(joint,) data over data less what was fitted to them: the trace of its part of the hat matrix."""
+    unit, sigma = plausible_sizes(problem.parameters), priors(problem.parameters)
+    slope = problem.jacobian(theta) * unit
+    inverse = np.linalg.pinv(slope.T @ slope + np.diag((unit / sigma) ** 2), hermitian=True)
+    leverage, n = np.sum((slope @ inverse) * slope, axis=1), problem.drivers.n_joints
+    count, fitted = np.bincount(problem.joint, minlength=n), np.bincount(problem.joint, leverage, minlength=n)
+    return np.asarray(count / np.maximum(count - fitted, limits.MOST_FITTED * np.maximum(count, 1)))
+
+
+def _likelihood(problem: TorqueProblem, misfit: Floats) -> tuple[float, Floats]:
+    """-2 log L of what is new in each datum, and its weights."""
+    alone = replace(problem, weights=np.ones(len(misfit)))
+    value, weights = likelihood_of(alone.whitened(misfit)[:, None], np.ones((len(misfit), 1, 1)))
+    return value - 2.0 * float(np.sum(np.log(alone.scale))), weights
+
+
+def with_torque(drivers: MotionDrivers, links: Floats) -> MotionDrivers:
+    """With the torque of these links at every moment: of joints that stand or turn back, too."""
+    n = drivers.n_joints
+    torque = (drivers.link_columns @ links).reshape(-1, n)
+    rate = np.gradient(torque, drivers.t_s, axis=0)
+    extra = {**drivers.extra, **{f"tau{i + 1}": torque[:, i] for i in range(n)}}
+    tilted = (drivers.lean_columns @ links).reshape(-1, n, 2)
+    return replace(drivers, torque_nm=torque, torque_rate_nm_s=rate, tilted=tilted, extra=extra)

@@ -1,0 +1,130 @@
+"""From a recorded motion to which torque was left out: the search of poses at the torques of the joints."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.random import Generator
+from numpy.typing import NDArray
+
+from acquisition.recording import Recording
+from acquisition.recording.rig import Rig
+from calibrate.diagnose.assess.diagnosis import Diagnosis
+from calibrate.diagnose.diagnose import diagnose
+from calibrate.diagnose.motion.motion_table import Motion, motion_of
+from calibrate.diagnose.motion.torque_problem import TorqueProblem, link_parameters
+from calibrate.diagnose.motion.torque_state import TorqueState, with_torque
+from calibrate.model.arms.catalogue import arm_of
+from calibrate.model.arms.inverse_dynamics import torque_columns
+from calibrate.model.effects.term import Accepted, Missing
+from calibrate.model.effects.torque import TORQUES, MotionDrivers, friction
+from calibrate.model.parameters import start_values
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class TorqueDiagnosis:
+    """What a motion shows; `bare` with the links alone, `model` with the terms of the findings."""
+
+    motion: Motion
+    diagnosis: Diagnosis
+    bare: TorqueState
+
+    @property
+    def model(self) -> TorqueState:
+        found = self.diagnosis.model
+        if not isinstance(found, TorqueState):
+            raise TypeError(f"a diagnosis of {type(found).__name__}, which is no fit to torques")
+        return found
+
+
+def diagnose_torques(recording: Recording, rng: Generator) -> TorqueDiagnosis | None:
+    """None where the recording holds no torques beside joint angles, or too few of them in motion."""
+    motion = motion_of(recording)
+    if motion is None:
+        return None
+    bare = torque_state(recording.rig, motion)
+    missing: tuple[Missing, ...] = tuple(m for kind in TORQUES for m in kind.missing(bare.drivers))
+    return TorqueDiagnosis(motion, diagnose(bare, rng, missing, usual=usual_friction(bare)), bare)
+
+
+def usual_friction(bare: TorqueState) -> tuple[Accepted, ...]:
+    """Dry and viscous friction of every joint: a drive without any is the exception, and links alone that have to stand
+    for it are no place to begin a search from.
+    """
+    terms = [term for kind in (friction.COULOMB, friction.VISCOUS) for term in kind.terms(bare.drivers)]
+    return tuple(Accepted(term, np.zeros(1), np.zeros(0)) for term in terms)
+
+
+def torque_state(rig: Rig, motion: Motion) -> TorqueState:
+    """The links alone, fitted."""
+    drivers = _drivers(rig, motion)
+    links = link_parameters(rig)
+    moment, joint = (part.astype(np.intp) for part in np.nonzero(np.isfinite(motion.torque_nm)))
+    order = np.lexsort((moment, joint))
+    moment, joint = moment[order], joint[order]
+    observed = motion.torque_nm[moment, joint]
+    columns = drivers.link_columns.reshape(*motion.q_rad.shape, -1)[moment, joint]
+    spread = np.array(
+        [max(float(np.std(observed[joint == j])), 1e-9) if np.any(joint == j) else 1.0 for j in range(rig.n_joints)]
+    )
+    whole = TorqueProblem(
+        links,
+        columns,
+        observed,
+        moment,
+        joint,
+        spread,
+        np.full(rig.n_joints, 1e-3),
+        np.ones(len(moment)),
+        (),
+        (),
+        drivers,
+    )
+    start, everything = start_values(links), np.arange(len(motion.time_s))
+    first = TorqueState(whole, everything, whole, start, np.inf)
+    return first.refitted(()).renewed()
+
+
+def _drivers(rig: Rig, motion: Motion) -> MotionDrivers:
+    arm = arm_of(rig)
+    frames = arm.frames(start_values(arm.parameters), motion.q_rad)
+    gravity = np.array(rig.arm.gravity_m_s2)
+    qd, qdd, none = motion.qd_rad_s, motion.qdd_rad_s2, np.zeros_like(motion.qd_rad_s)
+    columns = torque_columns(frames, qd, qdd, gravity)
+    lean = [torque_columns(frames, none, none, np.cross(axis, gravity)) for axis in np.eye(3)[:2]]
+    rows, n = qd.shape
+    rotors = qdd[:, :, None] * np.eye(n)
+    each = range(1, n + 1)
+    heat = motion.temperature_degC
+    plain = MotionDrivers(
+        rig=rig,
+        q_rad=motion.q_rad,
+        t_s=motion.time_s,
+        frames=frames,
+        readouts={},
+        approach=None,
+        approach_derived=False,
+        last_move_rad=none,
+        qd_rad_s=qd,
+        cmd_minus_q_rad=None,
+        temperatures_degC={} if heat is None else {f"joint{i}": heat[:, i - 1] for i in each},
+        payload_kg=None,
+        payload_com_m=None,
+        psd_sum_v=None,
+        extra={f"qdd{i}": qdd[:, i - 1] for i in each},
+        repeat=None,
+        qd=qd,
+        qdd_rad_s2=qdd,
+        torque_nm=none,
+        torque_rate_nm_s=none,
+        link_columns=np.concatenate([columns.reshape(rows * n, -1), rotors.reshape(rows * n, n)], axis=1),
+        lean_columns=np.concatenate(
+            [np.stack(lean, axis=2).reshape(rows * n * 2, -1), np.zeros((rows * n * 2, n))], axis=1
+        ),
+        last_link=columns[:, :, -1, :4],
+        tilted=np.zeros((rows, n, 2)),
+        still_rad_s=motion.still_rad_s,
+        temperature_degC=heat,
+    )
+    return with_torque(plain, start_values(link_parameters(rig)))

@@ -1,0 +1,31 @@
+"""What a joint's torque may hold beside rigid links: friction, rotors, loads, springs, drives; one line each."""
+
+from calibrate.model.effects.kind import Kind
+from calibrate.model.effects.term import Term
+from calibrate.model.effects.torque import drives, friction, loads
+from calibrate.model.effects.torque.motion_drivers import MotionDrivers, torque_port
+
+TORQUES: tuple[Kind, ...] = (
+    friction.COULOMB,
+    friction.VISCOUS,
+    friction.STRIBECK,
+    friction.LOADED,
+    friction.COLD,
+    friction.RUN_IN,
+    loads.ROTOR,
+    loads.PAYLOAD,
+    loads.GRAVITY,
+    loads.SPRING,
+    drives.CONSTANT,
+    drives.OFFSET,
+    drives.RIPPLE,
+    drives.DELAY,
+)
+
+
+def torque_terms(drivers: MotionDrivers) -> tuple[Term, ...]:
+    """Every place and form that the motion allows."""
+    return tuple(term for kind in TORQUES for term in kind.terms(drivers))
+
+
+__all__ = ["TORQUES", "MotionDrivers", "torque_port", "torque_terms"]

@@ -1,0 +1,213 @@
+"""Friction at a joint, by speed, load, temperature and time since the motion began. Against the motion, in Nm."""
+
+import numpy as np
+
+from calibrate.model.effects.drivers import Drivers
+from calibrate.model.effects.kind import Kind
+from calibrate.model.effects.term import Inner, Missing, Shape, Term
+from calibrate.model.effects.torque.motion_drivers import Floats, Law, MotionDrivers, at_torque, joints
+
+LIMIT_NM = 5e3  # the drive of joint 1 of a robot for 300 kg: 300 Nm (Weigand et al., KR 300 R2500)
+LIMIT_NMS = 2e4  # Nm per rad/s, of the same
+STRIBECK_RAD_S = (0.01, 0.02, 0.05, 0.1, 0.2)
+RUN_IN_S = (30.0, 100.0, 300.0, 1000.0)  # grease spreads in minutes: in less it is the motion that changes
+SPREAD_K = 2.0  # by which a joint must warm up before its friction can be said to follow
+
+
+def _coulomb(drivers: Drivers) -> tuple[Term, ...]:
+    return tuple(
+        at_torque(
+            i,
+            drivers.n_joints,
+            "coulomb-friction",
+            Shape.SIGN,
+            (f"qd{i}",),
+            _sense(i),
+            ("friction_nm",),
+            LIMIT_NM,
+            f"Joint {i} needs {{friction_nm}} more to turn than its model, either way: dry friction",
+            reversed_sentence=f"Joint {i} needs {{friction_nm}} less to turn than its model, either way",
+        )
+        for i in joints(drivers)
+    )
+
+
+def _sense(i: int) -> Law:
+    return lambda drivers, inner: drivers.sense(i)[:, None]
+
+
+def _viscous(drivers: Drivers) -> tuple[Term, ...]:
+    return tuple(
+        at_torque(
+            i,
+            drivers.n_joints,
+            "viscous-friction",
+            Shape.LINEAR,
+            (f"qd{i}",),
+            lambda d, inner, i=i: d.qd[:, i - 1 : i],
+            ("friction_nms_per_rad",),
+            LIMIT_NMS,
+            f"Joint {i} needs {{friction_nms_per_rad}} more to turn than its model: viscous friction, grease",
+            reversed_sentence=f"Joint {i} needs {{friction_nms_per_rad}} less to turn than its model",
+        )
+        for i in joints(drivers)
+    )
+
+
+def _stribeck(drivers: Drivers) -> tuple[Term, ...]:
+    def law(i: int) -> Law:
+        def function(d: MotionDrivers, inner: Floats) -> Floats:
+            return (d.sense(i) * np.exp(-((d.qd[:, i - 1] / inner[0]) ** 2)))[:, None]
+
+        return function
+
+    grid = Inner("speed_rad_s", STRIBECK_RAD_S, STRIBECK_RAD_S[0] / 3.0, 3.0 * STRIBECK_RAD_S[-1])
+    return tuple(
+        at_torque(
+            i,
+            drivers.n_joints,
+            "stribeck-friction",
+            Shape.EXPONENTIAL,
+            (f"qd{i}",),
+            law(i),
+            ("friction_nm",),
+            LIMIT_NM,
+            f"Joint {i} needs {{friction_nm}} more to turn slowly, below some {{speed_rad_s}}: stiction",
+            inner=(grid,),
+            positive=True,
+        )
+        for i in joints(drivers)
+    )
+
+
+def _loaded(drivers: Drivers) -> tuple[Term, ...]:
+    def law(i: int) -> Law:
+        return lambda d, inner: (d.sense(i) * np.abs(d.torque_nm[:, i - 1]))[:, None]
+
+    return tuple(
+        at_torque(
+            i,
+            drivers.n_joints,
+            "load-friction",
+            Shape.PRODUCT,
+            (f"qd{i}", f"tau{i}"),
+            law(i),
+            ("friction_share",),
+            1.0,
+            f"Joint {i} needs {{friction_share}} of its load more to turn: friction that grows with load",
+            positive=True,
+        )
+        for i in joints(drivers)
+    )
+
+
+def _cold(drivers: Drivers) -> tuple[Term, ...]:
+    if not isinstance(drivers, MotionDrivers) or drivers.temperature_degC is None:
+        return ()
+    warmth = _warmth(drivers)
+
+    def law(i: int) -> Law:
+        return lambda d, inner: (d.sense(i) * _warmth(d)[:, i - 1])[:, None]
+
+    return tuple(
+        at_torque(
+            i,
+            drivers.n_joints,
+            "temperature-friction",
+            Shape.PRODUCT,
+            (f"qd{i}", f"temp_joint{i}"),
+            law(i),
+            ("friction_nm_per_k",),
+            LIMIT_NM / 20.0,
+            f"Joint {i} needs {{friction_nm_per_k}} more to turn as it warms up",
+            reversed_sentence=f"Joint {i} needs {{friction_nm_per_k}} more to turn the colder it is: bearing or grease",
+        )
+        for i in joints(drivers)
+        if float(np.ptp(warmth[:, i - 1])) > SPREAD_K
+    )
+
+
+def _warmth(drivers: MotionDrivers) -> Floats:
+    """(moment, joint) K above the mean of the motion."""
+    heat = drivers.temperature_degC
+    return np.zeros_like(drivers.qd) if heat is None else heat - heat.mean(axis=0)
+
+
+def _run_in(drivers: Drivers) -> tuple[Term, ...]:
+    length_s = float(np.ptp(drivers.t_s)) if len(drivers.t_s) else 0.0
+    grid = tuple(one for one in RUN_IN_S if length_s > 2.0 * one)
+    if not grid:
+        return ()
+
+    def law(i: int) -> Law:
+        return lambda d, inner: (d.sense(i) * np.exp(-(d.t_s - d.t_s.min()) / inner[0]))[:, None]
+
+    return tuple(
+        at_torque(
+            i,
+            drivers.n_joints,
+            "running-in",
+            Shape.EXPONENTIAL,
+            (f"qd{i}", "t"),
+            law(i),
+            ("friction_nm",),
+            LIMIT_NM,
+            f"Joint {i} needs {{friction_nm}} more to turn at first, with a time constant of {{time_constant_s}}",
+            inner=(Inner("time_constant_s", grid, grid[0] / 3.0, 3.0 * grid[-1]),),
+            positive=True,
+            slow=True,
+        )
+        for i in joints(drivers)
+    )
+
+
+def _no_temperature(drivers: Drivers) -> tuple[Missing, ...]:
+    if isinstance(drivers, MotionDrivers) and drivers.temperature_degC is None:
+        return (Missing("temp", "joint_temperature_degC", "temperature-friction"),)
+    return ()
+
+
+COULOMB = Kind(
+    "coulomb-friction",
+    "Dry contact takes the same torque at any speed, against the motion.",
+    ("torque-offset", "load-friction"),
+    "Armstrong-Helouvry, Dupont, Canudas de Wit, A survey of models for friction, Automatica 30(7), 1994, section 2",
+    _coulomb,
+)
+VISCOUS = Kind(
+    "viscous-friction",
+    "Grease and oil take a torque that grows with speed.",
+    ("coulomb-friction", "torque-delay"),
+    "Armstrong-Helouvry, Dupont, Canudas de Wit, Automatica 30(7), 1994, section 2",
+    _viscous,
+)
+STRIBECK = Kind(
+    "stribeck-friction",
+    "Slow joints run on their asperities before a film of grease carries them.",
+    ("coulomb-friction",),
+    "Stribeck curve: Armstrong-Helouvry, Dupont, Canudas de Wit, Automatica 30(7), 1994, section 2.1",
+    _stribeck,
+)
+LOADED = Kind(
+    "load-friction",
+    "Gear teeth and bearings rub with the load that they carry.",
+    ("coulomb-friction", "torque-constant"),
+    "Hamon, Gautier, Garrec, Dynamic identification of robots with a dry friction model depending on load "
+    "and velocity, IROS 2010",
+    _loaded,
+)
+COLD = Kind(
+    "temperature-friction",
+    "Grease is stiff while it is cold.",
+    ("running-in",),
+    "Bittencourt, Gunnarsson, Static friction in a robot joint, J. Dyn. Sys. Meas. Control 134(5), 2012",
+    _cold,
+    _no_temperature,
+)
+RUN_IN = Kind(
+    "running-in",
+    "After a rest grease has to spread before a joint turns lightly.",
+    ("temperature-friction",),
+    "Carvalho Bittencourt, Axelsson, Modeling and experiment design for identification of wear in a robot joint, 2014",
+    _run_in,
+)

@@ -1,0 +1,94 @@
+"""What a torque may depend on, one value a moment of a motion; and the form of a term at one joint's torque."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calibrate.model.effects.drivers import Drivers
+from calibrate.model.effects.ports import Place, Port
+from calibrate.model.effects.term import Form, Inner, Shape
+
+Floats = NDArray[np.float64]
+Law = Callable[["MotionDrivers", Floats], Floats]  # (moment, m) for inner values (inner,)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class MotionDrivers(Drivers):
+    """Joint angles and speeds are smoothed; torque is that of the rigid links as fitted, never the measured one."""
+
+    qd: Floats  # (moment, joint) rad/s
+    qdd_rad_s2: Floats  # (moment, joint)
+    torque_nm: Floats  # (moment, joint) of the rigid links
+    torque_rate_nm_s: Floats  # (moment, joint) its derivative by time
+    link_columns: Floats  # (moment * joint, link number) torque for one unit of each number of each link
+    lean_columns: Floats  # (moment * joint * 2, link number) its change for one radian that gravity leans about x, y
+    last_link: Floats  # (moment, joint, 4) torque for one kg and one kg m along x, y, z of the flange
+    tilted: Floats  # (moment, joint, 2) torque for one radian by which gravity leans about x, y of the base
+    still_rad_s: Floats  # (joint,) below this speed it is open which way a joint turns
+    temperature_degC: Floats | None = None  # (moment, joint)
+
+    @property
+    def clock_is_a_cause(self) -> bool:
+        return False
+
+    def sense(self, joint: int) -> Floats:
+        """(moment,) -1 to 1: which way a joint (from 1) turns; nought while it stands."""
+        return np.tanh(self.qd[:, joint - 1] / self.still_rad_s[joint - 1])
+
+
+def torque_port(joint: int) -> Port:
+    """Of the torque of a joint, from 1."""
+    return Port(f"joint{joint}.torque", Place.JOINTS)
+
+
+def at_torque(
+    joint: int,
+    n_joints: int,
+    physics: str,
+    shape: Shape,
+    depends_on: tuple[str, ...],
+    law: Law,
+    names: tuple[str, ...],
+    limit: float,
+    sentence: str,
+    *,
+    inner: tuple[Inner, ...] = (),
+    order: int | None = None,
+    positive: bool = False,
+    polar: bool = False,
+    reversed_sentence: str = "",
+    slow: bool = False,
+) -> Form:
+    """A term at the torque of one joint (from 1). `positive`: no machine has it with the other sign."""
+    direction = np.zeros((n_joints, 1))
+    direction[joint - 1] = 1.0
+
+    def function(drivers: Drivers, inner: Floats) -> Floats:
+        if not isinstance(drivers, MotionDrivers):
+            raise TypeError("a torque without a motion")
+        return law(drivers, inner)
+
+    return Form(
+        torque_port(joint),
+        depends_on,
+        shape,
+        physics,
+        order,
+        inner,
+        slow,
+        function=function,
+        names=names,
+        limit=limit,
+        sentence=sentence,
+        reversed_sentence=reversed_sentence,
+        directions=direction,
+        polar=polar,
+        believable=(lambda values, inner: bool(values[0] > 0.0)) if positive else None,
+    )
+
+
+def joints(drivers: Drivers) -> range:
+    """Numbers of the joints, from 1."""
+    return range(1, drivers.n_joints + 1)
