@@ -389,15 +389,15 @@ def _session_by_contact(
     def person(supervisor: Supervisor) -> TouchPerson:
         if control is None and asking is not None:
             return TerminalPerson(asking, console, supervisor)
-        if control is None:
-            raise AcquisitionError("--touch asks a person at the terminal; start it in one, or give --control")
 
         def shown(text: str) -> None:
             console.print(text, highlight=False, markup=False, soft_wrap=True)
 
         home_rad = rig.motion.home_rad or (0.0,) * rig.n_joints
-        return EmulatedPerson(partial(_asked, *control), shown, home_rad, contact.distance or 0.05)
+        return EmulatedPerson(partial(_asked, *(control or ("", 0))), shown, home_rad, contact.distance or 0.05)
 
+    if control is None and asking is None:
+        raise AcquisitionError("--touch asks a person at the terminal; start it in one, or give --control")
     folder = TouchFolder(wanted.out, rig, text, go_on=go_on)
     hurry = wanted.emulators.time_scale
     run_touch(rig, folder, options, known, console, person, frees=contact.freedrive, hurry=hurry, seed=wanted.seed)

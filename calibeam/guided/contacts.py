@@ -14,10 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.guided.reading import Contact, Reading
-from acquisition.guided.touch import Advice
+from acquisition.guided.touch import FEWEST, Advice
 from acquisition.recording.rig import Rig, Tolerance
 from calibeam.guided.judge import ZERO_RAD, assumed_prior, prepared, refit_arm, telling
 from calibeam.guided.recorded import AssumedGuidedArm
+from calibrate.errors import DataError
 from calibrate.fit.solvers import NEAR_START, solve
 from calibrate.model.default_tolerance import SCALELESS
 from calibrate.model.parameters import Parameter, priors
@@ -27,7 +28,7 @@ TOOL_M = 0.01  # how well the ball's place at the flange is known: measured by h
 CANDIDATES = 32
 LEAN_RAD = 1.0  # from the mean direction of the tool so far: farther, a stem meets the rim of its socket
 SPREAD_RAD = 0.7  # of postures about the last one: a person turns a joint by so much in one go
-FAR_RAD = 2.0  # a turn that is asked for only where there is no smaller one
+FAR_RAD = np.pi  # a turn beyond is asked for only where there is no smaller one
 NOWHERE = 1_000_000  # number of a seat that no block has
 ELSEWHERE = ((0.75, 0.15), (1.1, 0.0))  # of the place: nearer and higher (m), farther
 OFTEN = 1e3  # times every candidate: what is uncertain then, stays so; more would drown the priors in rounding
@@ -50,13 +51,18 @@ class ContactJudge:
         self._enough_rad, self._rng = enough_rad, rng
         self._values: Mapping[str, float] = {}
         self._kept: list[Reading] = []
+        self._fitted = True  # False: the readings so far can not be fitted
         self._reported: list[Reading] = []
 
     def learn(self, readings: Sequence[Reading]) -> tuple[str, ...]:
-        fit = refit_arm(self._rig, [(reading,) for reading in readings], self._values, contact_prior)
+        try:
+            fit, trouble = refit_arm(self._rig, [(one,) for one in readings], self._values, contact_prior), ()
+        except DataError as error:  # touches of a plane on one line, so far
+            fit, trouble = None, (str(error),)
         if fit is None:
-            self._kept = list(readings)
-            return ()
+            self._kept, self._fitted = list(readings), not trouble
+            return trouble
+        self._fitted = True
         self._values = fit.values
         dropped = [visit[0] for visit in fit.dropped]
         self._kept = [one for one in readings if not _within(one, dropped)]
@@ -68,6 +74,8 @@ class ContactJudge:
         here = [one for one in self._kept if one.target == contact]
         if not here:
             return Advice("bring the ball there in any posture")
+        if not self._fitted or (contact.kind == "plane" and len(here) < FEWEST["plane"]):
+            return Advice("touch it elsewhere, with the tool leaning another way")
         candidates = self._candidates(contact, here)
         elsewhere = self._elsewhere(here) if contact.kind == "seat" else []
         used = telling([(one,) for one in (*self._kept, *candidates, *elsewhere)])

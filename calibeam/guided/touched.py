@@ -104,6 +104,13 @@ class TouchFolder:
         rows = [[reading.row().get(name, "") for name in names] for reading in readings]
         write_output(self.path / CSV, csv_text([names, *rows]), table_output(names, "table of samples"))
 
+    def discard(self) -> None:
+        """Nothing was taken: the next try may use the same name."""
+        for name in (RIG, CSV):
+            (self.path / name).unlink(missing_ok=True)
+        with suppress(OSError):  # other files are in it
+            self.path.rmdir()
+
     def _read(self, text: str) -> None:
         if (self.path / RIG).read_text(encoding="utf-8") != text:
             raise RecordingError(
@@ -263,7 +270,8 @@ def run_touch(
             session.run()
     except (*Interrupted, OSError) as why:
         reason = interruption(why) if isinstance(why, KeyboardInterrupt) else str(why)
-        if not taken and isinstance(why, DeviceError | AcquisitionError):
+        if not taken:
+            folder.discard()
             raise
         raise PartialResult(f"{reason}; contacts kept in {folder.path}: {len(taken)}; --continue goes on") from why
     console.print(f"contacts: {len(taken)}, in {folder.path}", highlight=False, markup=False)

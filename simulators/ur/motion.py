@@ -3,9 +3,8 @@
 It needs no wire: call `move_joints` and so on, then `before_step` once per TICK_S before the world is advanced, and
 wait until `moving` is False. It is the one owner of the set-point, of power and of the safety state.
 
-What it does not imitate: force mode, free-drive (`freedrive` is what was asked for over the wire; who
-guides the arm is simulators/hand/world.py), path deviation and
-collision detection, reduced mode, jerk limits, blends.
+What it does not imitate: force mode, free-drive (`freedrive` is what was asked for over the wire; who guides the arm is
+simulators/hand/world.py), path deviation and collision detection, reduced mode, jerk limits, blends.
 """
 
 import math
