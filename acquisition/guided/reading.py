@@ -8,7 +8,7 @@ for next.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -75,6 +75,20 @@ class SphereSpot:
 Target = Cone | BarEnd | SphereSpot
 
 
+@dataclass(frozen=True)
+class Contact:
+    """What a ball at the flange of a robot rests in or against; where that is in the base, is unknown."""
+
+    kind: Literal["seat", "plane"]
+    id: int
+    says: str  # "place 2, socket 1 (seat 3)"
+    place: int = 0  # the block's, of a socket
+
+    @property
+    def columns(self) -> Mapping[str, Cell]:
+        return {self.kind: self.id}
+
+
 Floats = NDArray[np.float64]
 
 
@@ -82,7 +96,7 @@ Floats = NDArray[np.float64]
 class Reading:
     """A row of the samples in the making."""
 
-    target: Target
+    target: Target | Contact
     q_rad: Floats  # (n,)
     t_s: float  # since the session began, of the encoders' own time
     host_s: float

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from acquisition.guided.plan import GuidedVisit, readings_of
 from acquisition.guided.reading import (
     Cone,
+    Contact,
     Coverage,
     Guide,
     GuidedProgress,
@@ -195,17 +196,18 @@ class GuidedSession:
 def nothing_new(arm: GuidedArm, target: Target, q_rad: Floats, taken: Sequence[Reading]) -> str | None:
     """What to do instead, for a person; None where a reading (n,) at the target adds something new."""
     if isinstance(target, Cone):
-        return _old_posture(q_rad, [one.q_rad for one in taken if one.target == target])
+        return old_posture(q_rad, [one.q_rad for one in taken if one.target == target])
     if isinstance(target, SphereSpot):
         return _old_spot(arm, q_rad, [one.q_rad for one in taken if _of_series(one.target, target)])
     return None
 
 
-def _of_series(other: Target, target: SphereSpot) -> bool:
+def _of_series(other: Target | Contact, target: SphereSpot) -> bool:
     return isinstance(other, SphereSpot) and (other.id, other.series) == (target.id, target.series)
 
 
-def _old_posture(q_rad: Floats, earlier: Sequence[Floats]) -> str | None:
+def old_posture(q_rad: Floats, earlier: Sequence[Floats]) -> str | None:
+    """What to do instead where a reading (n,) repeats one of the earlier postures."""
     if any(np.abs(q_rad - other).max() < OTHER_RAD for other in earlier):
         return f"was read here in this posture; turn some joint by {np.degrees(OTHER_RAD):.0f}° or more"
     return None

@@ -113,8 +113,8 @@ SILENCE_S = 1.0  # host time without a sample after which a wait gives up: longe
 class WiredEncoderWatch:
     """Implements acquisition.guided.stillness.EncoderWatch. `hurry`: device seconds in one second of the host."""
 
-    def __init__(self, pump: Pump, supervisor: Supervisor, hurry: float = 1.0) -> None:
-        self._pump, self._supervisor, self._hurry = pump, supervisor, hurry
+    def __init__(self, pump: Pump, supervisor: Supervisor, hurry: float = 1.0, channel: str = "position_rad") -> None:
+        self._pump, self._supervisor, self._hurry, self._channel = pump, supervisor, hurry, channel
         self._blocks: deque[Block] = deque()
         self._seen_s = -np.inf
 
@@ -134,6 +134,6 @@ class WiredEncoderWatch:
         """Rows in which every encoder answered."""
         t_s = np.concatenate([block.device_s for block in self._blocks]) * self._hurry
         host_s = np.concatenate([block.host_s for block in self._blocks])
-        q_rad = np.concatenate([block.values["position_rad"] for block in self._blocks])
+        q_rad = np.concatenate([block.values[self._channel] for block in self._blocks])
         whole = np.all(np.isfinite(q_rad), axis=1)
         return Window(t_s[whole], host_s[whole], q_rad[whole])

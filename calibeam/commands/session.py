@@ -12,11 +12,13 @@ from cyclopts import Parameter
 from acquisition.centring.strategies import CentringBy, CentringChoice
 from acquisition.errors import AcquisitionError
 from acquisition.guided.plan import GuidedOptions, planned_visits
+from acquisition.guided.touch import TouchOptions, TouchPerson
 from acquisition.recording import RecordingError
 from acquisition.recording.mcap import parts
 from acquisition.recording.pose_plan import PosePlan, read_pose_plan
 from acquisition.recording.rig import Rig, load_rig, rig_text
 from acquisition.session.plan import PlanOptions
+from acquisition.wires.streams import Supervisor
 from calibeam.asking import at_terminal
 from calibeam.console import Console
 from calibeam.devices.site import addresses_of, check_session, check_tracked_session, is_tracked, tracker_addresses_of
@@ -131,7 +133,7 @@ class HandOptions:
     Parameters
     ----------
     postures
-        Of a measuring arm: readings in each cone.
+        Readings in each cone of a measuring arm (72), or with --touch in each socket and on each plane (30).
     lengths
         Of a measuring arm: how often each bar position is measured.
     verify
@@ -139,7 +141,7 @@ class HandOptions:
 
     """
 
-    postures: int = GuidedOptions.postures
+    postures: int | None = None
     lengths: int = GuidedOptions.lengths
     verify: bool = False
 
@@ -147,7 +149,7 @@ class HandOptions:
     def given(self) -> dict[str, bool]:
         """Which of them were given; --verify has a refusal of its own."""
         return {
-            "--postures": self.postures != GuidedOptions.postures,
+            "--postures": self.postures is not None,
             "--lengths": self.lengths != GuidedOptions.lengths,
         }
 
@@ -169,6 +171,51 @@ class TrackerOptions:
     def given(self) -> dict[str, bool]:
         """Which of them were given."""
         return {"--poses": self.poses != DRAWN_POSES}
+
+
+@dataclass(frozen=True)
+class ContactOptions:
+    """What is asked of a session by contact, --touch.
+
+    Parameters
+    ----------
+    touch
+        Calibrate by contact: a person guides the robot, a ball at its flange in sockets; it is not moved from here.
+    seats
+        With --touch: sockets of the block.
+    places
+        With --touch: where the block stands, one after the other.
+    planes
+        With --touch: planes that the ball touches after the sockets.
+    distance
+        With --touch: distance of the two sockets as measured (m).
+    distance_sigma
+        With --touch: one sigma of --distance (m).
+    seat_sigma
+        With --touch: how well the ball sits, one sigma of a coordinate (m). Default: as in the rig file, else 0.0002.
+    zero_sigma
+        With --touch: one sigma of the joint zeros (rad) that is enough.
+    freedrive
+        With --touch, of a UR in remote control: freedrive is on while a person guides the arm, off while it is read.
+
+    """
+
+    touch: bool = False
+    seats: int = TouchOptions.seats
+    places: int = TouchOptions.places
+    planes: int = TouchOptions.planes
+    distance: float | None = None
+    distance_sigma: float = 3e-5
+    seat_sigma: float | None = None
+    zero_sigma: float = 2e-4
+    freedrive: bool = False
+
+    @property
+    def given(self) -> dict[str, bool]:
+        """Which of them were given without --touch."""
+        plain = ContactOptions()
+        names = ("seats", "places", "planes", "distance", "distance_sigma", "seat_sigma", "zero_sigma", "freedrive")
+        return {f"--{name.replace('_', '-')}": getattr(self, name) != getattr(plain, name) for name in names}
 
 
 @dataclass(frozen=True)
@@ -201,6 +248,7 @@ def session(
     emulators: Annotated[EmulatorOptions, Parameter(name="*")] = EmulatorOptions(),
     hand: Annotated[HandOptions, Parameter(name="*")] = HandOptions(),
     tracker: Annotated[TrackerOptions, Parameter(name="*")] = TrackerOptions(),
+    contact: Annotated[ContactOptions, Parameter(name="*")] = ContactOptions(),
 ) -> None:
     """Run a session: check, plan, align, centre, measure, report.
 
@@ -215,6 +263,7 @@ def session(
 
     The arm moves: clear the cell first. SPACE or Ctrl-C pauses, r resumes, s finishes, a aborts, h halts.
     Of a measuring arm a person moves the probe, and is guided: rigs/arm-cmm-reference.toml.
+    With --touch a person guides the robot by hand, and no device measures: docs/without-a-measuring-device.md.
 
     Parameters
     ----------
@@ -237,10 +286,19 @@ def session(
         Of a measuring arm.
     tracker
         Of a rig with a tracker.
+    contact
+        Of a session by contact.
 
     """
     wanted = Wanted(load_rig(rig), rig_text(rig), out, plan, seed, emulators)
     _check_verify(wanted.rig, plan, verify=hand.verify)
+    if contact.touch:
+        ignored = {name: given for name, given in robot.given.items() if name != "--continue"}
+        ignored |= {**tracker.given, "--live": page != PageOptions(), "--plan": plan is not None}
+        ignored |= {"--lengths": hand.given["--lengths"], "--verify": hand.verify}
+        _refuse_ignored(wanted.rig, ignored, "a session without --touch")
+        return _session_by_contact(wanted, contact, hand.postures, Console(), go_on=robot.continue_)
+    _refuse_ignored(wanted.rig, contact.given, "a session by contact, --touch")
     of_robot = {**robot.given, "--live": page != PageOptions()}
     if not is_tracked(wanted.rig):
         _refuse_ignored(wanted.rig, tracker.given, "a rig with a tracker")
@@ -300,12 +358,49 @@ def _session_with_tracker(wanted: Wanted, tracker: TrackerOptions, page: PageOpt
 def _session_by_hand(wanted: Wanted, hand: HandOptions, console: Console) -> None:
     """The session of a measuring arm: a person moves the probe, or an emulated hand."""
     rig, verify, (poses, _) = wanted.rig, hand.verify, wanted.poses()
-    options = GuidedOptions(hand.postures, hand.lengths, wanted.seed)
+    options = GuidedOptions(hand.postures or GuidedOptions.postures, hand.lengths, wanted.seed)
     visits = plan_of(rig, options, verify=verify) if poses is None else planned_visits(poses, rig)
     encoders = encoder_address(rig, hurry=wanted.emulators.time_scale)
     control = wanted.emulators.address()
     ask = None if control is None else partial(_asked, *control)
     run_guided(rig, wanted.text, wanted.out, encoders, visits, console, seed=wanted.seed, ask=ask, conclude=not verify)
+
+
+def _session_by_contact(
+    wanted: Wanted, contact: ContactOptions, postures: int | None, console: Console, *, go_on: bool
+) -> None:
+    """The session of a robot that a person guides into sockets; an emulated person where --control is given."""
+    from calibeam.guided.touched import (  # the fit takes a second to load
+        EmulatedPerson,
+        KnownContacts,
+        TerminalPerson,
+        TouchFolder,
+        run_touch,
+        touch_rig_text,
+    )
+
+    rig, control, asking = wanted.rig, wanted.emulators.address(), at_terminal()
+    options = TouchOptions(
+        contact.seats, contact.places, contact.planes, TouchOptions.postures if postures is None else postures
+    )
+    known = KnownContacts(contact.distance, contact.distance_sigma, contact.seat_sigma, contact.zero_sigma)
+    text = touch_rig_text(rig, wanted.text, options, known)
+
+    def person(supervisor: Supervisor) -> TouchPerson:
+        if control is None and asking is not None:
+            return TerminalPerson(asking, console, supervisor)
+
+        def shown(text: str) -> None:
+            console.print(text, highlight=False, markup=False, soft_wrap=True)
+
+        home_rad = rig.motion.home_rad or (0.0,) * rig.n_joints
+        return EmulatedPerson(partial(_asked, *(control or ("", 0))), shown, home_rad, contact.distance or 0.05)
+
+    if control is None and asking is None:
+        raise AcquisitionError("--touch asks a person at the terminal; start it in one, or give --control")
+    folder = TouchFolder(wanted.out, rig, text, go_on=go_on)
+    hurry = wanted.emulators.time_scale
+    run_touch(rig, folder, options, known, console, person, frees=contact.freedrive, hurry=hurry, seed=wanted.seed)
 
 
 @contextmanager

@@ -7,7 +7,8 @@ the fit is made again. An early reading on the rim was taken when it could not b
 towards it; left out, all others agree again.
 """
 
-from collections.abc import Mapping, Sequence
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import msgspec
@@ -17,7 +18,7 @@ from numpy.typing import NDArray
 from acquisition.guided.reading import BarEnd, Cone, OffTarget, Reading
 from acquisition.recording import Samples
 from acquisition.recording.rig import Rig, Tolerance
-from acquisition.recording.samples import BAR
+from acquisition.recording.samples import BAR, PLANE
 from calibrate.fit.identify.session import instruments_for_fit
 from calibrate.fit.joint_problem import JointProblem
 from calibrate.fit.solvers import FAR_START, NEAR_START, solve
@@ -31,7 +32,7 @@ from calibrate.model.default_tolerance import SCALELESS
 from calibrate.model.dual_psd_rig import assumed_noise
 from calibrate.model.parameters import Parameter, priors, values_by_name
 from calibrate.model.rigid import cross_matrix
-from calibrate.model.sensors import seat
+from calibrate.model.sensors import plane, seat
 from calibrate.model.sensors.seat import SEAT_ASSUMED_M
 
 Floats = NDArray[np.float64]
@@ -59,20 +60,27 @@ def visits_of(readings: Sequence[Reading]) -> tuple[Visit, ...]:
     return (*cones, *zip(ends[::2], ends[1::2], strict=True))
 
 
-def refit_arm(rig: Rig, visits: Sequence[Visit], values: Mapping[str, float]) -> Refit | None:
+def refit_arm(
+    rig: Rig,
+    visits: Sequence[Visit],
+    values: Mapping[str, float],
+    prior: Callable[[Parameter], Parameter] | None = None,
+) -> Refit | None:
     """From `values` by name, where there are any; None where no cone was taken twice and no bar at all.
 
-    Of two visits that only contradict each other the later one goes.
+    Of two visits that only contradict each other the later one goes. `prior`: `assumed_prior` where none is given.
     """
     kept, dropped = list(visits), list[Visit]()
-    while used := _telling(kept):
-        weighting, parameters, start = _prepared(rig, used, values)
+    while used := telling(kept):
+        weighting, parameters, start = prepared(rig, used, values, prior or assumed_prior)
         problem = weighting.problem(start).with_parameters(parameters)
         fit = solve(problem, start=start, damping=NEAR_START if values else FAR_START, max_steps=30)
         if not np.all(np.isfinite(fit.covariance)):
             return None
         values = {
-            p.name: float(v) for p, v in zip(parameters, fit.theta, strict=True) if not p.name.startswith(seat.POINTS)
+            p.name: float(v)
+            for p, v in zip(parameters, fit.theta, strict=True)
+            if not p.name.startswith((seat.POINTS, plane.PLANES))
         }
         sigmas = _without_itself(problem, weighting, fit.theta, used)
         worst = len(sigmas) - 1 - int(np.argmax(sigmas[::-1]))
@@ -84,21 +92,24 @@ def refit_arm(rig: Rig, visits: Sequence[Visit], values: Mapping[str, float]) ->
     return None
 
 
-def _telling(visits: Sequence[Visit]) -> list[Visit]:
-    """Without cones that were taken once."""
-    often: dict[int, int] = {}
-    for visit in visits:
-        if isinstance(visit[0].target, Cone):
-            often[visit[0].target.id] = often.get(visit[0].target.id, 0) + 1
-    return [v for v in visits if not isinstance(v[0].target, Cone) or often[v[0].target.id] > 1]
+def telling(visits: Sequence[Visit]) -> list[Visit]:
+    """Without cones that were taken once, and planes touched less often than determines them."""
+    places = [None if isinstance(v[0].target, BarEnd) else tuple(v[0].target.columns.items()) for v in visits]
+    often = Counter(places)
+    return [
+        visit
+        for visit, place in zip(visits, places, strict=True)
+        if place is None or often[place] >= (plane.FEWEST if PLANE in visit[0].target.columns else 2)
+    ]
 
 
-def _prepared(
-    rig: Rig, used: Sequence[Visit], values: Mapping[str, float]
+def prepared(
+    rig: Rig, used: Sequence[Visit], values: Mapping[str, float], prior: Callable[[Parameter], Parameter]
 ) -> tuple[Weighting, tuple[Parameter, ...], Floats]:
+    """The fit of these visits before it is made: weights, parameters with their priors, and where they start."""
     samples = samples_of([reading for visit in used for reading in visit], rig.n_joints)
     weighting = instruments_for_fit(rig, samples).weighting
-    parameters = tuple(assumed_prior(p) for p in weighting.parameters)
+    parameters = tuple(prior(p) for p in weighting.parameters)
     return weighting, parameters, np.array([values.get(p.name, p.start) for p in parameters])
 
 

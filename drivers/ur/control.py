@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike
 from drivers.clock import Clock, SystemClock
 from drivers.device import Floats
 from drivers.errors import DeviceError, DeviceLost, DeviceRefused, DeviceStale
-from drivers.ur.control_link import Ended, Motion, MoveJoints, Outcome, ServoJoints, ServoStop
+from drivers.ur.control_link import Ended, Freedrive, Motion, MoveJoints, Outcome, ServoJoints, ServoStop
 from drivers.ur.dashboard import UrDashboard
 from drivers.ur.pulse import check_stream
 from drivers.ur.supervised import SupervisedChild
@@ -113,6 +113,15 @@ class UrControl:
     def servo_stop(self, deceleration_rad_s2: float = STOP_DECELERATION_RAD_S2) -> None:
         """Ends a stream of set-points; blocks until the arm stands. Raises as `move_joints`."""
         self._call(ServoStop(deceleration_rad_s2), MARGIN_S)
+
+    def freedrive(self, on: bool) -> None:
+        """Lets a person guide the arm, or holds it again. Raises as `move_joints`.
+
+        `stop`, `close`, the end of this program and a lost connection end it, too: it is a mode of the control program.
+        Source: Universal Robots, "URScript": freedrive_mode, end_freedrive_mode; the mode ends with the program.
+        """
+        self._q_rad = None
+        self._call(Freedrive(on), MARGIN_S)
 
     def stop(self, deceleration_rad_s2: float = STOP_DECELERATION_RAD_S2) -> None:
         """Brakes, from any thread and in every state; a move that is under way ends with DeviceRefused.

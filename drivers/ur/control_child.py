@@ -25,6 +25,7 @@ from drivers.ur.control_link import (
     Call,
     Close,
     Ended,
+    Freedrive,
     Link,
     MoveJoints,
     Outcome,
@@ -54,6 +55,8 @@ class Control(Protocol):
     def servoJ(self, q: Sequence[float], v: float, a: float, t: float, lookahead: float, gain: float) -> bool: ...
     def servoStop(self, a: float) -> bool: ...
     def stopJ(self, a: float) -> None: ...
+    def freedriveMode(self) -> bool: ...
+    def endFreedriveMode(self) -> bool: ...
     def stopScript(self) -> None: ...
     def setWatchdog(self, min_frequency: float) -> bool: ...
     def kickWatchdog(self) -> bool: ...
@@ -88,7 +91,7 @@ class ControlChild:
         self._beaten_s = self._turned_s = now_s()  # when the parent last beat, and when this process last looked
         self._asked_s = now_s()  # after the parent's state
         self._expired = False
-        self._servoing = False
+        self._servoing = self._freedrive = False
 
     def run(self) -> None:
         """Until Close. ParentGone when the other end of a line closes."""
@@ -133,6 +136,9 @@ class ControlChild:
                     stopped = self._control.servoStop(deceleration)
                     self._renew()
                     return self._judge(stopped)
+                case Freedrive(on):
+                    self._freedrive = on
+                    return self._judge(self._control.freedriveMode() if on else self._control.endFreedriveMode())
         except (RuntimeError, ValueError, TypeError) as error:  # what ur_rtde throws for arguments out of range
             return Ended(Outcome.REFUSED, str(error))
 
@@ -201,6 +207,9 @@ class ControlChild:
         return True
 
     def _brake(self, deceleration_rad_s2: float) -> None:
+        if self._freedrive:  # a stop ends it, too: nobody expects an arm that was stopped to give way
+            self._freedrive = False
+            self._control.endFreedriveMode()
         if self._servoing:  # the script's servo thread would go on under a stopj
             self._servoing = False
             self._control.servoStop(deceleration_rad_s2)

@@ -38,11 +38,17 @@ class ServoStop(msgspec.Struct, frozen=True, tag=True):
     deceleration_rad_s2: float
 
 
+class Freedrive(msgspec.Struct, frozen=True, tag=True):
+    """Answered by Ended at once; on: a person may guide the arm until it is switched off, or the program ends."""
+
+    on: bool
+
+
 class Call(msgspec.Struct, frozen=True, tag=True):
     """One request on the line of calls; numbers count up from 1."""
 
     number: int
-    request: MoveJoints | ServoJoints | ServoStop
+    request: MoveJoints | ServoJoints | ServoStop | Freedrive
 
 
 class Stop(msgspec.Struct, frozen=True, tag=True):
@@ -90,7 +96,7 @@ class Ended(msgspec.Struct, frozen=True, tag=True):
     text: str = ""
 
 
-Motion = MoveJoints | ServoJoints | ServoStop
+Motion = MoveJoints | ServoJoints | ServoStop | Freedrive
 Request = Call | Stop | Beat | Close
 Answer = Ready | Alive | Ended
 _requests = msgspec.json.Decoder[Request](Request)

@@ -8,14 +8,17 @@ What the hand does is worked out only when somebody looks: between two looks not
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+from simulators.arm.kinematics import reach_point
 from simulators.errors import WorldError
 from simulators.hand.hand_rig import HandRig, HandTruth, draw_hand_truth, read_hand_rig
-from simulators.hand.held_arm import Ball, Hand, TrueArm
+from simulators.hand.held_arm import Ball, CannotReachError, Hand, TrueArm
+from simulators.world.rig import read_rig
+from simulators.world.truth import Truth, arm_of
 
 Floats = NDArray[np.float64]
 
@@ -123,3 +126,49 @@ def _named(what: str, number: int, known: Mapping[int, Any]) -> Any:
     if number not in known:
         raise WorldError(f"hand: no {what} {number!r}; there are {', '.join(map(str, known)) or 'none'}")
     return known[number]
+
+
+GUIDED_RAD_S, GUIDED_RAD_S2 = 1.5, 3.0  # of an arm that is led by hand
+
+
+class Guidable(Protocol):
+    """The controller's part of it."""
+
+    def within_limits(self, q_rad: ArrayLike) -> bool: ...
+    def move_joints(self, q_rad: ArrayLike, speed_rad_s: float, acceleration_rad_s2: float) -> None: ...
+
+
+class GuidedRobot:
+    """A person who guides a robot until the ball at its flange rests at a point of the base: verb "robot.guide".
+
+    The person feels the socket: the true arm closes on it, whatever its controller takes for its angles. Does not
+    imitate: forces at the socket, an arm that gives way (the true geometry closes, hidden mechanisms do not), obstacles
+    on the way, a controller that refuses because freedrive is off: the person may jog as well.
+    """
+
+    def __init__(self, rig: Mapping[str, Any], truth: Truth, controller: Guidable) -> None:
+        """`rig` as `tomllib` gives it; what scatters does so by the seed of the truth."""
+        self._controller, self._target_m = controller, np.array(truth.target_m)
+        self._arm = arm_of(read_rig(rig), truth)
+        self._rng = np.random.default_rng(np.random.SeedSequence([truth.seed, 11]))
+
+    def guide(self, point_m: Sequence[float], posture_rad: Sequence[float], contact_m: float = 0.0) -> None:
+        """Begins to bring the ball to `point_m` (3,) in a posture near `posture_rad` (n,), both finite.
+
+        `contact_m`: one sigma of each coordinate by which the ball rests beside it. WorldError for other numbers,
+        CannotReachError where no posture near it reaches, MoveRefused where the controller holds the arm.
+        """
+        wanted_m, start_rad = np.asarray(point_m, dtype=np.float64), np.asarray(posture_rad, dtype=np.float64)
+        if wanted_m.shape != (3,) or start_rad.shape != (self._arm.n_joints,):
+            raise WorldError(f"guide to {point_m!r} m, posture {posture_rad!r} rad: 3 and {self._arm.n_joints} numbers")
+        wanted_m = wanted_m + contact_m * self._rng.standard_normal(3)
+        joint_rad, arrived = reach_point(
+            self._arm, self._target_m, wanted_m[np.newaxis], (start_rad + self._arm.zero_rad)[np.newaxis]
+        )
+        reading_rad = joint_rad[0] - self._arm.zero_rad
+        if not (arrived[0] and self._controller.within_limits(reading_rad)):
+            raise CannotReachError(
+                f"the hand cannot put the probe at {np.round(wanted_m, 3).tolist()} m near that posture; "
+                "ask for another"
+            )
+        self._controller.move_joints(reading_rad, GUIDED_RAD_S, GUIDED_RAD_S2)

@@ -299,6 +299,14 @@ def is_steady(s: Script) -> None:
     s.answer_integer(int(s.arm.steady))
 
 
+def freedrive_on(s: Script) -> None:
+    s.arm.freedrive = True
+
+
+def freedrive_off(s: Script) -> None:
+    s.arm.freedrive = False
+
+
 def freedrive_status(s: Script) -> None:
     s.answer_integer(0)  # normal
 
@@ -358,8 +366,8 @@ COMMANDS: dict[int, Command] = {
     46: inverse,
     47: is_steady,
     51: move_until_contact,
-    52: no_effect,  # free-drive
-    53: no_effect,
+    52: freedrive_on,
+    53: freedrive_off,
     54: freedrive_status,
     56: no_effect,  # force input
     57: no_effect,

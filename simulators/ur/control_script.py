@@ -139,6 +139,7 @@ class ControlScript:
         return self._obey(self.integer(COMMAND))
 
     def halt(self) -> None:
+        self.arm.freedrive = False
         self.memory.on_int_written.remove(self._hear)
 
     def arm_watchdog(self, min_frequency_hz: float) -> None:

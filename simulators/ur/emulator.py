@@ -12,6 +12,7 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Any, Protocol
 
+from simulators.hand.world import GuidedRobot
 from simulators.ur.control_script import ControlScript
 from simulators.ur.controller_kinematics import NominalArm
 from simulators.ur.dashboard_server import Dashboard
@@ -30,6 +31,7 @@ from simulators.ur.script_program import (
 )
 from simulators.ur.state_streams import ScriptWire, primary_stream, realtime_stream
 from simulators.wire import Bench, DeviceClock, TcpPort, Wire
+from simulators.world.world import World
 
 RTDE_PORT, DASHBOARD_PORT, SCRIPT_PORTS = 30004, 29999, (30001, 30002, 30003)
 PRIMARY_PORT, REALTIME_PORT = 30001, 30003
@@ -150,6 +152,9 @@ def build(world: ArmWorld, rig: Mapping[str, Any], host: str, *, unlock_delay_s:
             "robot.obstacle": verbs.obstacle,
             "robot.state": verbs.state,
             "robot.standing": verbs.standing,
+            **(
+                {"robot.guide": GuidedRobot(rig, world.truth, controller.arm).guide} if isinstance(world, World) else {}
+            ),
         },
         controller.clock,
     )
@@ -235,6 +240,7 @@ class Safety:
         return {
             "robot_mode": power.robot_mode.name,
             "safety_mode": power.safety_mode.name,
+            "freedrive": "ON" if self._controller.arm.freedrive else "OFF",
             "runtime_state": self._controller.runner.state.name,
             "last_error": self._controller.runner.last_error,
         }

@@ -3,8 +3,8 @@
 It needs no wire: call `move_joints` and so on, then `before_step` once per TICK_S before the world is advanced, and
 wait until `moving` is False. It is the one owner of the set-point, of power and of the safety state.
 
-What it does not imitate: force mode, free-drive (accepted over the wire, without effect), path deviation and
-collision detection, reduced mode, jerk limits, blends.
+What it does not imitate: force mode, free-drive (`freedrive` is what was asked for over the wire; who guides the arm is
+simulators/hand/world.py), path deviation and collision detection, reduced mode, jerk limits, blends.
 """
 
 import math
@@ -63,6 +63,7 @@ class ArmController:
         self.dynamics = Dynamics(world, arm, carried or Carried())
         self.T_flange_tool: Frame = IDENTITY
         self.speed_scaling = 1.0
+        self.freedrive = False
         self.stop_reason = ""  # of the last protective stop
         self._world = world
         self._lower_rad, self._upper_rad = list(lower_rad), list(upper_rad)

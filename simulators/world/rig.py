@@ -93,7 +93,10 @@ class Emulation(msgspec.Struct, frozen=True):
     device_rotation_sigma_rad: Sigma = 0.0
 
 
-NEEDED = 'emulation needs [arm] model = "dh", [tool], and, unless it has [devices.tracker], [fixture], [[placement]]'
+NEEDED = (
+    'emulation needs [arm] model = "dh", [tool], and, unless it has [devices.tracker], or [devices.robot] and '
+    "tool.point_m alone, [fixture], [[placement]]"
+)
 
 
 class WorldRig(msgspec.Struct, frozen=True):
@@ -119,11 +122,12 @@ def read_rig(rig: Mapping[str, Any]) -> WorldRig:
 
 
 def _refuse_what_is_missing(rig: WorldRig, plain: Mapping[str, Any]) -> None:
-    """A light needs a laser, a fixture and its places; only a rig that is measured by a tracker alone has none."""
-    if rig.fixture is None and "tracker" in plain.get("devices", {}):
+    """A light needs a laser, a fixture and its places; a rig with a tracker, or a robot with a ball alone, has none."""
+    devices, tool = plain.get("devices", {}), plain.get("tool", {})
+    alone = "robot" in devices and "psd" not in devices and "point_m" in tool
+    if rig.fixture is None and ("tracker" in devices or alone):
         return
     named = {"[fixture]": rig.fixture is not None, "[[placement]]": bool(rig.placement)}
-    tool = plain.get("tool", {})
     named |= {f"tool.{key}": key in tool for key in ("laser_origin_m", "laser_direction")}
     missing = next((name for name, there in named.items() if not there), None)
     if missing is not None:

@@ -12,6 +12,7 @@ from drivers.ur.control_link import (
     Beat,
     Call,
     Ended,
+    Freedrive,
     Link,
     MoveJoints,
     Outcome,
@@ -41,6 +42,14 @@ class Notes:
 
     def servoStop(self, a) -> bool:
         self.done.append("servo stop")
+        return True
+
+    def freedriveMode(self) -> bool:
+        self.done.append("freedrive")
+        return True
+
+    def endFreedriveMode(self) -> bool:
+        self.done.append("freedrive ends")
         return True
 
     def getAsyncOperationProgress(self) -> int:
@@ -193,3 +202,21 @@ def _ended(child) -> object:
     while isinstance(answer, Alive):
         answer = child.calls.next_answer(1.0)
     return answer
+
+
+def test_a_stop_ends_freedrive_once(child) -> None:
+    child.calls.send(Call(1, Freedrive(True)))
+    child.turn()
+    assert child.calls.next_answer(1.0) == Ended(Outcome.DONE)
+    for number in (1, 1):
+        child.stops.send(Stop(5.0, up_to=number))
+        child.turn()
+    assert child.notes.done == ["freedrive", "freedrive ends", "stop", "stop"]
+
+
+def test_freedrive_ends_where_the_parent_beats_no_more(child) -> None:
+    child.calls.send(Call(1, Freedrive(True)))
+    child.turn()
+    child.time_s += 1.5 * LEASE_S
+    child.turn_of_loop()
+    assert child.notes.done == ["freedrive", "freedrive ends", "stop"]
