@@ -202,8 +202,8 @@ def figures() -> tuple[Figure, ...]:
 
 
 TODAY = {
-    "files": 768,
-    "code": 82_000,
+    "files": 771,
+    "code": 82_600,
     "longest_function": 53,
     "one_importer": 2,
     "classes": 0,
