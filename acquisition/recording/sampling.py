@@ -83,8 +83,7 @@ def sampling_of(time_s: Floats, sequence: Ints) -> Sampling:
         solution, covariance, left_s = _line(number[rows], late_s[rows], steps)
         period_s += float(solution[1])
     scatter_s = float(np.sqrt(np.mean(left_s**2)))
-    within = np.setdiff1d(np.arange(left_s.size - 1), np.array(steps, dtype=int) - 1)
-    ratio = float(np.mean(np.diff(left_s)[within] ** 2)) / max(scatter_s**2, 1e-24)
+    ratio = float(np.mean(np.diff(left_s) ** 2)) / max(scatter_s**2, 1e-24)
     if (
         not period_s > 0.0
         or len(steps) >= MOST_STEPS
@@ -139,8 +138,11 @@ def _steps(number: Floats, late_s: Floats) -> list[int]:
 
 def _line(number: Floats, late_s: Floats, steps: list[int]) -> tuple[Floats, Floats, Floats]:
     """Start, slope and sizes of the steps; their covariance; what is left, (window,) s."""
+    window = np.arange(number.size)
+    whole = ~np.isin(window, [w - side for w in steps for side in (0, 1)])  # a part of a window may have no prompt row
+    window, number, late_s = window[whole], number[whole], late_s[whole]
     scale = max(float(number[-1]), 1.0)
-    after = [(np.arange(number.size) >= w).astype(float) for w in steps]
+    after = [(window >= w).astype(float) for w in steps]
     design = np.stack([np.ones(number.size), number / scale, *after], axis=1)
     solution = np.linalg.lstsq(design, late_s, rcond=None)[0]
     left_s = late_s - design @ solution

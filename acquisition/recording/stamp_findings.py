@@ -126,7 +126,7 @@ def _step_says(recording: Recording, stream: Stream, sampling: Sampling, row: in
     if step.size_s < 0.0 and step.skipped and -step.size_s > SLEPT * step.skipped * period_s:
         return (
             f"the clock of the stamps slept: it fell behind by {size} {at}, where {step.skipped} samples are missing; "
-            "keep the computer from suspending during a session, and use both parts as two recordings"
+            "restore the times with calibeam import --restore-stamps, and keep the computer from suspending"
         )
     samples = step.size_s / period_s
     if step.size_s > 0.0 and not counts(stream) and abs(samples - round(samples)) * period_s < SIGMAS * step.sigma_s:
