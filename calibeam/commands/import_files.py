@@ -189,7 +189,7 @@ def _can(source: Path, out: Path, rig: Path) -> None:
         done, whole = _frames(source, rig, out)
         try:
             rows = encoder_rows(whole, encoders)
-            whole = replace(whole, streams={**whole.streams, ENCODERS: encoder_stream(rows)})
+            whole = replace(whole, streams={**whole.streams, ENCODERS: encoder_stream(rows, whole)})
             found = f", {len(rows)} rows of {ENCODERS}"
         except NoSetUpError as why:
             found = f"; no angles: {why}"
