@@ -21,6 +21,7 @@ RATE_OFF = 5e-3  # fifty times a poor quartz
 OTHER_RATE = 0.1  # beyond, it was set to another rate on purpose
 SIGMAS = 5.0
 SLEPT = 0.9  # of the time that missing numbers take, by which the clock fell behind
+SAME_S = 1.0  # no clock of a device shows the host's time so closely; a driver stamped for it
 PACE = 0.01  # host seconds in one of a device; beyond, emulators ran at another pace than real time
 
 
@@ -175,8 +176,10 @@ def _rates(streams: Mapping[str, Stream]) -> dict[str, float]:
     """Seconds of arrival in one second of the device, of streams that have both."""
     out: dict[str, float] = {}
     for name, stream in streams.items():
-        own = used_times(stream) is stream.device_s and np.ptp(stream.device_s) > 0.0
-        if own and not np.array_equal(stream.device_s, stream.host_s):
+        late_s = stream.host_s - used_times(stream)
+        by_host = stream.stamps in ("sent", "arrived", "restored") or np.all(late_s == 0.0)
+        by_host = by_host or (stream.stamps == "unknown" and late_s.min() >= 0.0 and late_s.max() < SAME_S)
+        if not by_host and np.ptp(stream.device_s) > 0.0:
             out[name] = float(np.ptp(stream.host_s) / np.ptp(stream.device_s))
     return out
 

@@ -1,5 +1,7 @@
 """The check names stamps that are not what they state, with size and remedy, and none in healthy streams."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -119,6 +121,14 @@ def test_two_clocks_that_disagree_are_named(seed: int) -> None:
     assert "off the clock of stream laser" in findings[0].says
     value, sigma = number_after(findings[0].says, "its clock runs ")
     assert abs(value - 100.0 * (1.0 / 1.018 - 1.0)) < 4.0 * sigma + 1e-5
+
+
+@pytest.mark.parametrize("stamps", ["sent", "unknown"])
+def test_an_emulation_at_another_pace_is_no_finding_beside_stamps_of_the_host(stamps: str) -> None:
+    one = world(9)
+    fast = stream(one.prompt(), device_s=1.67 * one.true_s, stamps="sampled", name="robot")
+    late_s = one.prompt()
+    assert not found(fast, replace(stream(late_s, device_s=one.true_s - 0.005, name="encoders"), stamps=stamps))
 
 
 def test_samples_that_were_lost_without_a_counter_are_steps_forward() -> None:
