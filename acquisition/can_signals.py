@@ -97,12 +97,16 @@ def encoder_rows(recording: Recording, encoders: EncodersDevice) -> list[Row]:
     return rows
 
 
-def encoder_stream(rows: list[Row]) -> Stream:
-    """As the driver of these encoders streams them; stamped by the bus adapter."""
+def encoder_stream(rows: list[Row], frames: Recording) -> Stream:
+    """As the driver of these encoders streams them; the stamps are those of the frames, which all come of one log."""
+    log = next((stream for stream in frames.streams.values() if is_frames(stream)), None)
+    stamps = "unknown" if log is None else log.stamps
     host_s = np.array([time_s for time_s, _ in rows])
     angles_rad = np.array([angles for _, angles in rows])
     channel = Channel(CHANNEL, "rad", angles_rad.shape[1:])
-    return Stream(STREAM, (channel,), host_s, host_s, np.arange(len(rows), dtype=np.int64), {CHANNEL: angles_rad})
+    return Stream(
+        STREAM, (channel,), host_s, host_s, np.arange(len(rows), dtype=np.int64), {CHANNEL: angles_rad}, stamps=stamps
+    )
 
 
 def encoder_sheet(rows: list[Row], recording: Recording, source: Path) -> Sheet:

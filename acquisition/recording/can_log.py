@@ -41,7 +41,7 @@ from acquisition.recording.can_frames import (
 from acquisition.recording.errors import RecordingError, shown
 from acquisition.recording.files.bounds import BATCH_BYTES, FEW, MESSAGES, TABLE_BYTES, TIME_S, UNPACKED_BYTES
 from acquisition.recording.mcap.writer import RecordingWriter, StreamWriter
-from acquisition.recording.recording import Recording, time_utc
+from acquisition.recording.recording import Recording, Stamps, time_utc
 
 _FLAGS = (
     ("is_extended_id", int(FrameFlag.EXTENDED)),
@@ -106,6 +106,10 @@ _WRITERS: Mapping[str, Callable[[Path], MessageWriter]] = MappingProxyType(
     {".blf": can.BLFWriter, ".asc": can.ASCWriter, ".csv": can.CSVWriter, ".log": can.CanutilsLogWriter}
 )
 SUFFIXES = tuple(_READERS)
+# "application" in a BLF header (Vector, binlog_objects.h): CANalyzer, CANoe, CANlog, CANcaseXL log; python-can writes 5
+VECTOR_TOOLS = (1, 2, 4, 6)
+BLF_APPLICATION = 8  # byte of the header
+ASC_HEAD = 400  # bytes with the line "// version" of Vector's tools, which python-can does not write
 
 
 @dataclass(frozen=True)
@@ -124,6 +128,7 @@ def import_can(source: Path, path: Path, *, rig_text: str, software: str) -> Can
     the damage is kept, and the recording is not complete.
     """
     survey = _surveyed(source)
+    stamps = stamps_of_log(source)
     log = _Log(source)
     with RecordingWriter(
         path,
@@ -134,7 +139,7 @@ def import_can(source: Path, path: Path, *, rig_text: str, software: str) -> Can
         started_utc=datetime.fromtimestamp(0, UTC) + timedelta(seconds=survey.start_s),
     ) as writer:
         inlets = {
-            channel: _Inlet(writer.stream(name, channels(survey.width), viewer=()), survey)
+            channel: _Inlet(writer.stream(name, channels(survey.width), viewer=(), stamps=stamps), survey)
             for name, channel in survey.channels.items()
         }
         for message in log:
@@ -143,6 +148,27 @@ def import_can(source: Path, path: Path, *, rig_text: str, software: str) -> Can
             inlet.write()
         writer.close(complete=log.damage is None)
     return CanImport(sum(inlet.count for inlet in inlets.values()), tuple(survey.channels), log.damage)
+
+
+def stamps_of_log(source: Path) -> Stamps:
+    """What the format states: `hardware` in logs that Vector's tools wrote, `arrived` (the host's kernel) in candump.
+
+    Unknown elsewhere: python-can writes the same formats, with whatever stamps its interface gave. RecordingError.
+    """
+    suffix = source.suffix.lower()
+    if suffix == ".log":
+        return "arrived"
+    try:
+        with source.open("rb") as file:
+            head = file.read(ASC_HEAD)
+    except OSError as error:
+        raise RecordingError(f"{source}: cannot read it ({error.strerror}); check the path") from error
+    by_vector = (
+        len(head) > BLF_APPLICATION and head[BLF_APPLICATION] in VECTOR_TOOLS
+        if suffix == ".blf"
+        else suffix == ".asc" and b"// version" in head
+    )
+    return "hardware" if by_vector else "unknown"
 
 
 def export_can(recording: Recording, path: Path) -> int:

@@ -10,6 +10,7 @@ from acquisition.recording.can_frames import CHANNELS_NOTE, FLAGS, FrameFlag, is
 from acquisition.recording.mcap.layout import SEGMENT_NOTE
 from acquisition.recording.recording import Recording, Stream
 from acquisition.recording.samples import Floats
+from acquisition.recording.stamp_findings import stamp_findings
 
 LOG_NOTES = (SEGMENT_NOTE, CHANNELS_NOTE)
 
@@ -26,6 +27,9 @@ class Problem(enum.Enum):
     NO_SAMPLES = "no-samples"
     SATURATED = "saturated"
     ERROR_FRAMES = "error-frames"
+    BURSTS = "bursts"
+    CLOCK_STEP = "clock-step"
+    RATE = "rate"
     CONTROLLER_ARM = "controller-arm"  # computed by whoever has the kinematics: calibrate/fit/controller_arm.py
 
 
@@ -57,7 +61,15 @@ USUAL_GAP = 50  # samples in one gap: half a second of encoders asked every 10 m
 
 def check(recording: Recording) -> tuple[Finding, ...]:
     """Everything found: errors, warnings, information; of each the file, streams, then samples. Empty: all is well."""
-    found = (*_file(recording), *_streams(recording), *_samples(recording))
+    stamps = [
+        Finding(Problem(kind), f"stream {name}", says, Severity.WARNING)
+        for kind, name, says in stamp_findings(recording)
+    ]
+    in_bursts = {finding.where for finding in stamps if finding.problem is Problem.BURSTS}
+    streams = [  # one stamp for a whole batch is no sample that came twice
+        one for one in _streams(recording) if one.problem is not Problem.DUPLICATE_TIME or one.where not in in_bursts
+    ]
+    found = (*_file(recording), *streams, *stamps, *_samples(recording))
     return tuple(sorted(found, key=lambda finding: list(Severity).index(finding.severity)))
 
 

@@ -22,7 +22,7 @@ from acquisition.recording.samples import Floats, Samples
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 _STREAM_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]*")
 _RESERVED = ("host_s", "device_s", "sequence")
-Stamps = Literal["sampled", "sent", "arrived", "hardware", "unknown"]
+Stamps = Literal["sampled", "sent", "arrived", "hardware", "restored", "unknown"]
 STAMPS: tuple[Stamps, ...] = get_args(Stamps)
 
 

@@ -50,18 +50,26 @@ class Streams(Protocol):
         ...
 
 
+def frame_stamps(interface: str) -> Stamps:
+    """What the stamps of frames are, by python-can's name of the interface (python-can 4, "CAN Interface Modules")."""
+    if interface == "socketcan":  # the kernel's, unless the adapter's own are asked for, which python-can does not
+        return "arrived"
+    return "hardware" if interface in ("ixxat", "kvaser", "pcan", "vector") else "unknown"
+
+
 class FrameLog:
     """`hear` is a tap. Frames wait BLOCK_S at most while others follow; `flush` writes the last of a quiet bus.
 
     Frames of CAN FD that are longer than a classic one get a stream of their own, declared when the first comes.
     """
 
-    def __init__(self, recording: Streams, clock: Clock) -> None:
+    def __init__(self, recording: Streams, clock: Clock, stamps: Stamps = "unknown") -> None:
+        self._stamps: Stamps = stamps
         self.count = 0  # frames heard so far
         self.errors = 0  # error frames among them
         self._recording = recording
         self._classic = _Counted(
-            recording.stream(STREAM, channels(CLASSIC_BYTES), viewer=(), stamps="hardware"), CLASSIC_BYTES
+            recording.stream(STREAM, channels(CLASSIC_BYTES), viewer=(), stamps=stamps), CLASSIC_BYTES
         )
         self._long: _Counted | None = None
         self._now_s: Callable[[], float] = clock.now_s
@@ -103,7 +111,7 @@ class FrameLog:
     def _write_long(self, frames: Sequence[Frame]) -> None:
         if self._long is None:
             self._long = _Counted(
-                self._recording.stream(FD_STREAM, channels(FD_BYTES), viewer=(), stamps="hardware"), FD_BYTES
+                self._recording.stream(FD_STREAM, channels(FD_BYTES), viewer=(), stamps=self._stamps), FD_BYTES
             )
         self._long.append(frames)
 

@@ -33,6 +33,8 @@ from acquisition.recording.foreign import (
     write_columns,
     write_session,
 )
+from acquisition.recording.restored_stamps import NOTE as RESTORED_NOTE
+from acquisition.recording.restored_stamps import restored_stamps
 from acquisition.recording.rig import load_rig, rig_text
 from acquisition.recording.session_folder import CSV, PARQUET, RIG
 from acquisition.recording.session_folder.folder_import import import_folder, write_recording
@@ -60,6 +62,7 @@ def import_command(
     seat_from: Literal["file"] | None = None,
     streams: bool = False,
     stamps: Stamps | None = None,
+    restore_stamps: bool = False,
     yes: bool = False,
 ) -> None:
     """Make a session of a table, a log or a session folder.
@@ -75,6 +78,7 @@ def import_command(
     calibeam import session --out session.mcap
     calibeam import bus.blf --rig rigs/ur5e-dual-psd.toml --out bus.mcap
     calibeam import robot.csv encoders.csv --streams --rig rig.toml --out streams.mcap
+    calibeam import lab.mcap --restore-stamps --out restored.mcap
     calibeam import */hole_?.csv --seat-from file --header-row 0 --columns "1..7 [rad] = q" --rig rig.toml --out session
     ```
 
@@ -106,6 +110,9 @@ def import_command(
     stamps
         What the times of a log are: `sampled` (clock of the device when it measured), `sent`, `arrived` (at the program
         that wrote the log) or `hardware` (of a CAN adapter).
+    restore_stamps
+        Put times of regular sampling in place of stamps in bursts, or of a clock that was set, as `check` names them:
+        of a log, a session folder, or a recording. Refused where sampling is not regular, or samples may be missing.
     yes
         Take the columns as they are understood, without asking. An open unit is an error then.
 
@@ -117,14 +124,16 @@ def import_command(
             raise RecordingError(f"{others[0]}: a session folder is imported by itself; leave the others out")
         given = {"rig": rig, "columns": columns, "sheet": sheet, "header_row": header_row, "streams": streams}
         _refuse(source, "a session folder has its own rig.toml", **given, stamps=stamps)
-        with taken_back(out):
-            import_folder(source, out, software=SOFTWARE)
-        print(f"{out}: {len(read(out).samples)} samples")
+        _folder(source, out, restore_stamps=restore_stamps)
+        return
+    if restore_stamps and source.suffix.lower() == ".mcap" and rig is None:
+        _restored_recording(source, others, out)
         return
     for path in (source, *others):
         _check_known(path)
     if seat_from is not None:
-        _refuse(source, "the postures in a seat have no time", streams=streams, stamps=stamps)
+        given = {"streams": streams, "stamps": stamps, "restore_stamps": restore_stamps}
+        _refuse(source, "the postures in a seat have no time", **given)
     if sheet is not None and not any(path.suffix.lower() in WORKBOOKS for path in (source, *others)):
         raise RecordingError(f"{source}: --sheet {sheet}: only a workbook has sheets; leave --sheet out")
     if rig is None:
@@ -133,23 +142,29 @@ def import_command(
         seats = read_seats((source, *others), sheet, header_row)
         _table(understand(seats, rig_text(rig), str(rig), columns), out, yes=yes)
     elif _is_can(source) and not others:
-        _refuse(
-            source, "a CAN log has no columns", columns=columns, sheet=sheet, header_row=header_row, streams=streams
-        )
-        _refuse(source, "frames of a CAN log keep the stamps of the log", stamps=stamps)
+        given = {"columns": columns, "sheet": sheet, "header_row": header_row, "streams": streams}
+        _refuse(source, "a CAN log has no columns", **given)
+        why = "frames of a CAN log keep the stamps of the log"
+        _refuse(source, why, stamps=stamps, restore_stamps=restore_stamps)
         _can(source, out, rig)
     elif streams or source.is_dir() or KINDS.get(source.suffix.lower()) == "bag":
         sheets = [table for path in (source, *others) for table in _log_tables(path, (sheet, header_row), rig, out)]
-        _logs(understand_logs(sheets, rig_text(rig), str(rig), columns), out, stamps or "unknown", yes=yes)
-    elif stamps is not None:
-        raise RecordingError(f"{source}: --stamps states what the times of a log are; give --streams for a log")
-    elif others:
+        understood = understand_logs(sheets, rig_text(rig), str(rig), columns)
+        _logs(understood, out, stamps or "unknown", restore_stamps=restore_stamps, yes=yes)
+    else:
+        _check_one_table(source, others, stamps, restore_stamps=restore_stamps)
+        _table(understand(read_sheet(source, sheet, header_row), rig_text(rig), str(rig), columns), out, yes=yes)
+
+
+def _check_one_table(source: Path, others: Sequence[Path], stamps: Stamps | None, *, restore_stamps: bool) -> None:
+    if stamps is not None or restore_stamps:
+        option = "--restore-stamps" if stamps is None else "--stamps"
+        raise RecordingError(f"{source}: {option} concerns the times of a log; give --streams for a log")
+    if others:
         raise RecordingError(
             f"{others[0]}: one table becomes one session; give --streams for several logs of one time, or "
             "--seat-from file for one table a seat"
         )
-    else:
-        _table(understand(read_sheet(source, sheet, header_row), rig_text(rig), str(rig), columns), out, yes=yes)
 
 
 def _check_known(path: Path) -> None:
@@ -174,7 +189,7 @@ def _can(source: Path, out: Path, rig: Path) -> None:
         done, whole = _frames(source, rig, out)
         try:
             rows = encoder_rows(whole, encoders)
-            whole = replace(whole, streams={**whole.streams, ENCODERS: encoder_stream(rows)})
+            whole = replace(whole, streams={**whole.streams, ENCODERS: encoder_stream(rows, whole)})
             found = f", {len(rows)} rows of {ENCODERS}"
         except NoSetUpError as why:
             found = f"; no angles: {why}"
@@ -216,13 +231,41 @@ def _log_tables(path: Path, place: tuple[str | None, int | None], rig: Path, out
     return (encoder_sheet(encoder_rows(frames, encoders), frames, path),)
 
 
-def _logs(tables: Sequence[Understanding], out: Path, stamps: Stamps, *, yes: bool) -> None:
+def _folder(source: Path, out: Path, *, restore_stamps: bool) -> None:
+    """A recording of a session folder."""
+    with taken_back(out):
+        import_folder(source, out, software=SOFTWARE, restore_stamps=restore_stamps)
+    made = read(out)
+    print("\n".join((f"{out}: {len(made.samples)} samples", *_restored_lines(made))))
+
+
+def _restored_recording(source: Path, others: Sequence[Path], out: Path) -> None:
+    """A recording of the same, with the times restored."""
+    if others:
+        raise RecordingError(f"{others[0]}: a recording is restored by itself; leave the others out")
+    whole = restored_stamps(read(source))
+    with taken_back(out):
+        write_recording(whole, out, software=SOFTWARE, imported_from=source.name, started_utc=whole.started)
+    print("\n".join((f"{out}: {len(whole.samples)} samples", *_restored_lines(whole))))
+
+
+def _restored_lines(recording: Recording) -> Iterator[str]:
+    for name, note in recording.notes.items():
+        if name.startswith(RESTORED_NOTE):
+            yield f"{name.removeprefix(RESTORED_NOTE)}: time stamps restored: {note}"
+
+
+def _logs(
+    tables: Sequence[Understanding], out: Path, stamps: Stamps, *, restore_stamps: bool = False, yes: bool
+) -> None:
     """A recording of streams, after a person has agreed to what the columns mean."""
     if out.suffix.lower() != ".mcap":
         raise RecordingError(f"--out {out}: logs become a recording; give a name that ends with .mcap")
     console = Console()
     tables = [with_units(table, yes=yes, settled=False) for table in tables]
     recording, started_utc = recording_of(tables, out, stamps)
+    if restore_stamps:
+        recording = restored_stamps(replace(recording, path=tables[0].sheet.path))
     about = [columns_file(table, None, SOFTWARE) for table in tables]
     for one in about:
         print_columns(console, one)
@@ -233,7 +276,8 @@ def _logs(tables: Sequence[Understanding], out: Path, stamps: Stamps, *, yes: bo
         columns_path = write_columns(about, out)
     for name, stream in recording.streams.items():
         console.print(f"{out}: {name}, {counted(len(stream.host_s), 'row')}", markup=False, highlight=False)
-    console.print(f"columns: {columns_path}", markup=False, highlight=False)
+    for line in (*_restored_lines(recording), f"columns: {columns_path}"):
+        console.print(line, markup=False, highlight=False)
 
 
 def _agreed(*, yes: bool) -> None:

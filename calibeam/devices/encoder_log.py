@@ -15,7 +15,7 @@ from acquisition.recording import Channel, Gap, RecordingWriter
 from acquisition.recording.mcap import Rotation, SegmentedRecording, SegmentStream
 from acquisition.recording.rig.devices import EncodersDevice, TrackerDevice
 from acquisition.wires.attaching import Guarded, Reopening
-from acquisition.wires.frame_log import FrameLog
+from acquisition.wires.frame_log import FrameLog, frame_stamps
 from acquisition.wires.streams import Pump
 from calibeam.devices.encoders import VIEWED, encoder_driver, identities_of, names_of
 from calibeam.devices.instruments import VIEWED as TRACKER_VIEWED
@@ -70,7 +70,8 @@ class EncoderLog:
         self._device = Reopening(Guarded(self._driver), clock, self._lost, self._back, who=who)
         begin = partial(_begin, rig_text=rig_text, clock=clock)
         self._recording = SegmentedRecording(folder, begin, clock, rotation)
-        self._frames = FrameLog(self._recording, clock) if raw else None
+        if raw and isinstance(device, EncodersDevice):
+            self._frames = FrameLog(self._recording, clock, frame_stamps(device.interface))
         self._stream: SegmentStream | None = None
         self.since_s: float | None = None  # host time from which it runs
         self._rows = self._outages = 0

@@ -115,6 +115,7 @@ class Output:
     before: bytes  # what was sent the time before on this line
     damaged: Callable[[bytes], bytes]
     hang_up: bool = False
+    tick: int = 0  # of the line, now
 
     @property
     def data(self) -> bytes:
@@ -197,6 +198,13 @@ def _delay(output: Output, fault: Fault, target: Target) -> bool:
     return True
 
 
+def _in_bursts(output: Output, fault: Fault, target: Target) -> bool:
+    """Everything waits for the next whole multiple of the pause."""
+    pause = max(1, round(fault.settings["seconds"] / TICK_S))
+    output.parts = [(-output.tick % pause + held, part) for held, part in output.parts]
+    return True
+
+
 def _split(output: Output, fault: Fault, target: Target) -> bool:
     """The second part comes a while later."""
     data = output.data
@@ -251,6 +259,7 @@ def _duplicate(output: Output, fault: Fault, target: Target) -> bool:
 
 LINE_FAULTS = (
     LineFault("delay", _delay, {"seconds": Setting(0.1, TICK_S, 60.0)}),
+    LineFault("bursts", _in_bursts, {"seconds": Setting(0.3, TICK_S, 60.0)}),
     LineFault("split", _split, {"seconds": Setting(0.01, TICK_S, 60.0)}),
     LineFault("junk", _junk, {"bytes": Setting(16, 1, MOST_JUNK_BYTES)}),
     LineFault("checksum", _checksum),

@@ -163,7 +163,7 @@ class FaultyWire:
         return self._released()
 
     def _send(self, data: bytes) -> None:
-        output = Output([(0, data)] if data else [], self._before, self._damaged)
+        output = Output([(0, data)] if data else [], self._before, self._damaged, tick=self._tick)
         self._injector.disturb(output, self._port)
         self._before = output.data or self._before
         if output.hang_up:

@@ -11,19 +11,29 @@ from pathlib import Path
 from acquisition.recording.errors import RecordingError, shown
 from acquisition.recording.mcap.writer import RecordingWriter
 from acquisition.recording.recording import Recording, Stream, time_utc
+from acquisition.recording.restored_stamps import restored_stamps
 from acquisition.recording.session_folder.folder import read_folder
 
 WAITING = 16 * 2**20  # bytes given to the writer before it is waited for: a quarter of what may wait (write_thread.py)
 BLOCK = 1000  # rows of a stream at a time; a viewer loads little more than the time it shows
 
 
-def import_folder(folder: Path | str, path: Path | str, *, software: str, started_utc: datetime | None = None) -> None:
+def import_folder(
+    folder: Path | str,
+    path: Path | str,
+    *,
+    software: str,
+    started_utc: datetime | None = None,
+    restore_stamps: bool = False,
+) -> None:
     """Make a recording of a session folder: rig, samples, and the streams, events and gaps of its folder `streams`.
 
-    Without streams.json there, session time 0 is host time 0. RecordingError if `path` exists or `folder` is no session
-    folder, RigFileError, SamplesError.
+    Without streams.json there, session time 0 is host time 0. `restore_stamps`: as `restored_stamps`. RecordingError if
+    `path` exists or `folder` is no session folder, RigFileError, SamplesError.
     """
     source = read_folder(Path(folder))
+    if restore_stamps:
+        source = restored_stamps(source)
     started_utc = _started(source, Path(folder)) or started_utc
     write_recording(source, path, software=software, imported_from=Path(folder).name, started_utc=started_utc)
 

@@ -219,3 +219,29 @@ def test_nothing_is_overwritten(record_frames, tmp_path: Path) -> None:
     (tmp_path / "bus.asc").write_text("precious")
     with pytest.raises(RecordingError, match="nothing is overwritten"):
         export_can(record_frames(messages()), tmp_path / "bus.asc")
+
+
+@pytest.mark.parametrize(
+    ("suffix", "altered", "stamps"),
+    [
+        (".log", lambda raw: raw, "arrived"),
+        (".csv", lambda raw: raw, "unknown"),
+        (".blf", lambda raw: raw, "unknown"),  # by python-can, as exported
+        (".blf", lambda raw: raw[:8] + bytes([2]) + raw[9:], "hardware"),  # by CANoe
+        (".asc", lambda raw: raw, "unknown"),
+        (
+            ".asc",
+            lambda raw: raw.replace(b"internal events logged", b"internal events logged\n// version 9.0.0"),
+            "hardware",
+        ),
+    ],
+)
+def test_frames_have_the_kind_of_stamp_that_the_format_states(
+    suffix: str, altered: Callable[[bytes], bytes], stamps: str, record_frames, tmp_path: Path, rig_source: str
+) -> None:
+    log = tmp_path / f"bus{suffix}"
+    export_can(record_frames(messages()), log)
+    log.write_bytes(altered(log.read_bytes()))
+    assert import_can(log, tmp_path / "back.mcap", rig_text=rig_source, software="calibeam").frames == 1000
+    (stream,) = read(tmp_path / "back.mcap").streams.values()
+    assert stream.stamps == stamps

@@ -8,7 +8,7 @@ import pytest
 
 from acquisition.recording import RecordingError
 from acquisition.recording.can_frames import FrameFlag
-from acquisition.wires.frame_log import BLOCK_S, FrameLog
+from acquisition.wires.frame_log import BLOCK_S, FrameLog, frame_stamps
 
 
 class Clock:
@@ -129,3 +129,18 @@ def test_two_threads_lose_and_double_nothing(recorded) -> None:
         thread.join()
     assert kept.sequence == list(range(2000))
     assert sorted(kept.ids) == sorted(number % 0x7FF for number in range(2000))
+
+
+@pytest.mark.parametrize(
+    ("interface", "stamps"),
+    [("socketcan", "arrived"), ("vector", "hardware"), ("pcan", "hardware"), ("slcan", "unknown")],
+)
+def test_frames_have_the_stamps_of_their_interface(interface: str, stamps: str) -> None:
+    declared: list[str] = []
+
+    class Declaring:
+        def stream(self, name, channels, viewer=None, *, stamps="unknown"):
+            declared.append(stamps)
+
+    FrameLog(Declaring(), Clock(), frame_stamps(interface))
+    assert declared == [stamps]

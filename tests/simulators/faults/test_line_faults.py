@@ -54,6 +54,11 @@ def test_without_a_fault_everything_passes_as_it_is(line) -> None:
     assert line.cycles(3) == [b"<1>", b"<2>", b"<3>"]
 
 
+def test_bursts_come_together_and_nothing_is_lost(line) -> None:
+    line.inject("bursts", seconds=4 * TICK_S)
+    assert line.cycles(8) == [b"", b"", b"", b"<1><2><3><4>", b"", b"", b"", b"<5><6><7><8>"]
+
+
 def test_a_fault_clears_itself_after_its_count(line) -> None:
     line.inject("silence", count=2)
     assert line.cycles(4) == [b"", b"", b"<3>", b"<4>"]
