@@ -417,6 +417,11 @@ class Rig(Struct, frozen=True, forbid_unknown_fields=True):
         return len(self.arm.joints)
 
     @property
+    def n_encoders(self) -> int:
+        """One a joint; of a rig without an arm as many as are named."""
+        return self.n_joints or (0 if self.devices.encoders is None else len(self.devices.encoders.named))
+
+    @property
     def placements(self) -> Mapping[int, Placement]:
         """By id, in the order of the file."""
         return {placement.id: placement for placement in self.placement_list}
