@@ -355,6 +355,7 @@ EMULATION_KEYS = (
     "laser_direction_sigma_rad",
     "joint_repeatability_rad",
     "psd_noise_m",
+    "controller_link2_length_m",
     "laser_power_w",
     "camera_origin_sigma_m",
     "camera_rotation_sigma_rad",
