@@ -61,10 +61,10 @@ def channels(width: int = CLASSIC_BYTES) -> tuple[Channel, ...]:
 
 def block_of(frames: Sequence[Frame], width: int = CLASSIC_BYTES) -> FrameBlock:
     """ValueError for a payload that is longer than `width`."""
-    longest = max((len(frame.data) for frame in frames), default=0)
+    longest = max([len(frame.data) for frame in frames], default=0)
     if longest > width:
         raise ValueError(f"a CAN frame of {longest} bytes in a stream of {width}; open the stream for CAN FD")
-    payload = b"".join(frame.data.ljust(width, b"\0") for frame in frames)
+    payload = b"".join([frame.data.ljust(width, b"\0") for frame in frames])
     host_s, device_s, can_id, flags, length, _ = zip(*frames, strict=True) if frames else ((),) * 6
     return FrameBlock(
         np.array(host_s, dtype=np.float64),

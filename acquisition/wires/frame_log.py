@@ -101,7 +101,7 @@ class FrameLog:
             return
         frames = [frame_of(message, host_s, sent=sent) for messages, host_s, sent in heard for message in messages]
         self.count += len(frames)
-        self.errors += sum(frame.flags & _ERROR > 0 for frame in frames)
+        self.errors += sum([frame.flags & _ERROR > 0 for frame in frames])
         long = [frame for frame in frames if len(frame.data) > CLASSIC_BYTES]
         if long:
             self._write_long(long)

@@ -13,15 +13,22 @@ from cyclopts import Parameter
 from acquisition.recording import Finding, Recording, Stream, check, read
 from acquisition.recording.device_clock import ClockModel, ClockStatus, clock_model
 from acquisition.recording.mcap import segments
-from acquisition.recording.rig import load_rig
+from acquisition.recording.rig import load_rig, parse_rig
 from acquisition.recording.samples import Floats
 from calibeam.console import Console
 from calibeam.devices.check import check_devices
 from calibeam.outcome import CheckFailed
 from calibeam.overwriting import writes
-from calibeam.results.controller_findings import RIG_FILE, arm_of_controller, controller_findings, write_controller_arm
+from calibeam.results.controller_findings import (
+    RIG_FILE,
+    arm_of_controller,
+    arm_of_poses,
+    controller_findings,
+    write_controller_arm,
+)
 from calibrate.diagnose.streams import devices_of, examine_encoders
 from calibrate.errors import DataError
+from calibrate.fit.controller_arm import ControllerPoses
 from calibrate.quantities import angle, angle_with_sigma
 from drivers.clock import SystemClock
 
@@ -34,21 +41,31 @@ MOST_LINES = 20  # findings of one file printed one by one; a script gets all of
 def check_recording(path: Path, *, as_json: bool = False, controller_arm: Path | None = None) -> bool:
     """Print what is in it and what was found; True when there is no error. RecordingError when it cannot be read.
 
-    `controller_arm`: where the controller's arm is written. DataError where the recording does not show it.
+    `controller_arm`: where the controller's arm is written, of all segments of a log one. DataError where they do not
+    show it, or are of several rigs.
     """
     files = segments(path) if path.is_dir() else []
-    good = True
+    good, rig_texts, poses = True, dict[str, Path](), list[ControllerPoses]()
     for file in files or [path]:
         recording = read(file)
         arm = arm_of_controller(recording)
         if controller_arm is not None:
-            write_controller_arm(recording, arm, controller_arm)
+            poses += filter(None, [ControllerPoses.of(recording)])
+            first = rig_texts.setdefault(recording.rig_text, file)
+            if len(rig_texts) > 1:
+                other = next(iter(rig_texts.values()))
+                raise DataError(
+                    f"--controller-arm: {other} and {first} are recordings of different rig files; give each by itself"
+                )
         findings = (*check(recording), *controller_findings(arm))
         good = good and not any(finding.is_error for finding in findings)
         if as_json:
             print(msgspec.json.encode(_as_json(recording, findings)).decode())
         else:
             Console(highlight=False, soft_wrap=True).print("\n".join(lines(recording, findings)), markup=False)
+    if controller_arm is not None:
+        rig = parse_rig(next(iter(rig_texts)), str(path))
+        write_controller_arm(rig, arm_of_poses(rig, ControllerPoses.joined(poses)), path, controller_arm)
     return good
 
 

@@ -25,8 +25,11 @@ MOST = 8  # differences in one sentence
 
 def arm_of_controller(recording: Recording) -> ControllerArm | None:
     """None where the recording holds no poses of the controller, or too few."""
-    poses = ControllerPoses.of(recording)
-    return None if poses is None or len(poses.q_rad) < FEWEST else controller_arm(recording.rig, poses)
+    return arm_of_poses(recording.rig, ControllerPoses.of(recording))
+
+
+def arm_of_poses(rig: Rig, poses: ControllerPoses | None) -> ControllerArm | None:
+    return None if poses is None or len(poses.q_rad) < FEWEST else controller_arm(rig, poses)
 
 
 def controller_findings(found: ControllerArm | None) -> tuple[Finding, ...]:
@@ -77,16 +80,16 @@ def sentence(found: ControllerArm) -> str:
     )
 
 
-def write_controller_arm(recording: Recording, found: ControllerArm | None, path: Path) -> None:
-    """The rig file. DataError where the recording does not show that arm, OSError where it cannot be written."""
+def write_controller_arm(rig: Rig, found: ControllerArm | None, source: Path, path: Path) -> None:
+    """The rig file. DataError where `source` does not show that arm, OSError where it cannot be written."""
     if found is None:
         raise DataError(
-            f"{recording.path}: it does not show the controller's arm; record the robot with its tool poses, or give "
+            f"{source}: it does not show the controller's arm; record the robot with its tool poses, or give "
             f"the columns {', '.join(CONTROLLER)} in {FEWEST} or more different poses"
         )
     if found.left_m > UNRELATED_M:
-        raise DataError(f"{recording.path}: {_unrelated(found)}")
-    write_output(path, controller_rig_text(recording.rig, found), RIG_FILE)
+        raise DataError(f"{source}: {_unrelated(found)}")
+    write_output(path, controller_rig_text(rig, found), RIG_FILE)
 
 
 def controller_rig_text(rig: Rig, found: ControllerArm) -> str:

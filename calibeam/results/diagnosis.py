@@ -37,6 +37,12 @@ SEED = 1  # of nulls, splits and bootstraps: the same recording always gives the
 
 Keep = Callable[[DiagnosisFile], None]
 
+NEXT_OF_AN_ARM = "record settled samples: streams alone show clocks, lags and faults, nothing of the geometry"
+NEXT_OF_ENCODERS = (
+    "`calibeam check LOG` shows pace, eccentricity, slips and noise of the encoders; `calibeam compare ONE TWO` "
+    "compares two logs of the same motion"
+)
+
 
 def diagnose_recording(
     recording: Recording,
@@ -80,7 +86,7 @@ def diagnose_streams(recording: Recording) -> DiagnosisFile:
         rms_after_m=None,
         findings=(),
         unexplained=None,
-        next=("record settled samples: streams alone show clocks, lags and faults, nothing of the geometry",),
+        next=(NEXT_OF_AN_ARM if recording.rig.n_joints else NEXT_OF_ENCODERS,),
         software=SOFTWARE,
         rig=RigRecord(recording.rig.name, rig_sha256(recording.rig_text)),
     )

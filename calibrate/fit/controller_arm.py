@@ -40,7 +40,8 @@ OUTLYING = 6.0  # sigma (of the median): a pose that was written at another time
 AXES = ("x", "y", "z", "rx", "ry", "rz")
 SAME_M = 1e-6  # of a tool's point: rounded in a table
 PARTS = ("tool", "base", "zeros", "links")
-TCP, JOINTS, OFFSET = "actual_tcp_pose_m_rad", "actual_q_rad", "tcp_offset_m_rad"  # channels of a robot's stream
+POSES = (("actual_tcp_pose_m_rad",), ("controller_position_m", "controller_rotation_rad"))  # the second of an import
+JOINTS, OFFSET = "actual_q_rad", "tcp_offset_m_rad"  # channels of a robot's stream
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,8 +57,10 @@ class ControllerPoses:
     def of(cls, recording: Recording) -> "ControllerPoses | None":
         """Of a robot's stream, or else of the columns of the samples; None where there are none."""
         for stream in recording.streams.values():
-            if TCP in stream.values and JOINTS in stream.values and stream.host_s.size:
-                q, pose = (np.asarray(stream.values[c], dtype=np.float64) for c in (JOINTS, TCP))
+            names = next((n for n in POSES if all(c in stream.values for c in (JOINTS, *n))), None)
+            if names is not None and stream.host_s.size:
+                q = np.asarray(stream.values[JOINTS], dtype=np.float64)
+                pose = np.concatenate([np.asarray(stream.values[c], dtype=np.float64) for c in names], axis=1)
                 offset = np.asarray(stream.values[OFFSET], dtype=np.float64) if OFFSET in stream.values else None
                 if q.shape[1:] != (recording.rig.n_joints,):
                     continue  # the robot of another rig
@@ -73,6 +76,17 @@ class ControllerPoses:
             return None
         rows = np.flatnonzero(known)[np.unique(np.linspace(0, int(known.sum()) - 1, MOST).astype(int))]
         return cls(samples.joints()[rows], _transforms(pose[rows]), None, "samples")
+
+    @classmethod
+    def joined(cls, several: "Sequence[ControllerPoses]") -> "ControllerPoses | None":
+        """Those of several recordings of one robot, evenly at most MOST; None of none."""
+        if not several:
+            return None
+        q, T = (np.concatenate([getattr(one, name) for one in several]) for name in ("q_rad", "T_base_tool"))
+        tools = [one.T_flange_tool for one in several if one.T_flange_tool is not None]
+        rows = np.unique(np.linspace(0, len(q) - 1, MOST).astype(int))
+        tool = np.concatenate(tools)[rows] if len(tools) == len(several) else None
+        return cls(q[rows], T[rows], tool, several[0].source)
 
     def rows(self, kept: Bools) -> "ControllerPoses":
         tool = None if self.T_flange_tool is None else self.T_flange_tool[kept]

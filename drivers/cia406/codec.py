@@ -98,11 +98,11 @@ class MappedNumber:
     """Where an object stands in a PDO: `bits` from bit `at` on, counted from the lowest of the first byte."""
 
     def __init__(self, at: int, bits: int) -> None:
-        self._at, self._mask, self._least_bits = at, (1 << bits) - 1, at + bits
+        self._at, self._mask, self._least_bytes = at, (1 << bits) - 1, -(-(at + bits) // 8)
 
     def read(self, data: bytes | bytearray) -> int | None:
         """Its unsigned value; None when the frame is shorter than its mapping states."""
-        if 8 * len(data) < self._least_bits:
+        if len(data) < self._least_bytes:
             return None
         return int.from_bytes(data, "little") >> self._at & self._mask
 
@@ -208,12 +208,12 @@ class ContinuousAngle:
             return self._last.units * self._unit_rad
         if self._uncertain:
             before = self._uncertain[-1]
-            reading = self._next(before, position, time_s)
-            if self._is_motion(reading, before):
+            reading, is_motion = self._next(before, position, time_s)
+            if is_motion:
                 return self._hold_back(reading, last)
             self._uncertain.clear()
-        reading = self._next(last, position, time_s)
-        if self._is_motion(reading, last):
+        reading, is_motion = self._next(last, position, time_s)
+        if is_motion:
             return self._accept(reading)
         return self._hold_back(_Reading(reading.units, time_s, last.rate), last)
 
@@ -234,29 +234,27 @@ class ContinuousAngle:
         return self._accept(reading)
 
     def _accept(self, reading: "_Reading") -> float:
-        last = self._last
+        last, units = self._last, reading.units
         if last is not None:
-            self.wraps += abs(reading.units // self._range - last.units // self._range)
+            self.wraps += abs(units // self._range - last.units // self._range)
         self._last = reading
         self._uncertain.clear()
-        return reading.units * self._unit_rad
+        return units * self._unit_rad
 
-    def _next(self, before: "_Reading", position: int, time_s: float) -> "_Reading":
-        step = self._step(position, before.units)
-        elapsed_s = time_s - before.time_s
-        return _Reading(before.units + step, time_s, step / elapsed_s if elapsed_s > 0.0 else before.rate)
-
-    def _is_motion(self, reading: "_Reading", before: "_Reading") -> bool:
+    def _next(self, before: "_Reading", position: int, time_s: float) -> tuple["_Reading", bool]:
+        """The reading after another, and whether the step to it is motion. Every frame comes here: no further calls."""
+        units, before_s, rate = before
+        step = (position - units + self._half) % self._range - self._half
+        elapsed_s = time_s - before_s
+        reading = _Reading(units + step, time_s, step / elapsed_s if elapsed_s > 0.0 else rate)
         unit_rad = self._size_rad
-        elapsed_s = reading.time_s - before.time_s
-        step = reading.units - before.units
         if abs(step) * unit_rad > self._speed_limit_rad_s * max(elapsed_s, TIME_SCATTER_S) + unit_rad:
-            return False
-        if math.isinf(self._acceleration_limit_rad_s2) or math.isnan(before.rate):
-            return True
-        off_rad = abs(step - before.rate * elapsed_s) * unit_rad
-        scatter_rad = 2.0 * abs(before.rate) * unit_rad * TIME_SCATTER_S
-        return off_rad <= self._acceleration_limit_rad_s2 * elapsed_s**2 + scatter_rad + 2.0 * unit_rad
+            return reading, False
+        if math.isinf(self._acceleration_limit_rad_s2) or math.isnan(rate):
+            return reading, True
+        off_rad = abs(step - rate * elapsed_s) * unit_rad
+        scatter_rad = 2.0 * abs(rate) * unit_rad * TIME_SCATTER_S
+        return reading, off_rad <= self._acceleration_limit_rad_s2 * elapsed_s**2 + scatter_rad + 2.0 * unit_rad
 
     def _step(self, position: int, old: int) -> int:
         return (position - old + self._half) % self._range - self._half

@@ -90,7 +90,7 @@ class SyncCycle:
                 break
         else:
             return ()
-        sync.answers[node] = math.nan if node in self._uncertain else position_rad
+        sync.answers[node] = math.nan if self._uncertain and node in self._uncertain else position_rad
         sync.arrived_s = now_s
         self._silent_since_s.pop(node, None)
         if len(self._under_way[0].answers) < self._nodes:
@@ -140,10 +140,8 @@ class SyncCycle:
         self._under_way.clear()
         rows: list[Row] = []
         for sync in syncs:
-            positions = tuple(
-                math.nan if node in short else sync.answers.get(node, math.nan) for node in range(self._nodes)
-            )
-            if not all(math.isnan(position_rad) for position_rad in positions):
+            positions = tuple([math.nan if n in short else sync.answers.get(n, math.nan) for n in range(self._nodes)])
+            if not all(map(math.isnan, positions)):
                 rows.append(Row(self._first + sync.number, sync.sent_s, sync.arrived_s, positions))
         self._plan()
         return tuple(rows)

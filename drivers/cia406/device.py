@@ -282,7 +282,7 @@ class Cia406Encoders(StreamDevice[can.BusABC]):
 
     def _add(self, rows: Sequence[Row]) -> None:
         for row in rows:
-            slips_rad = tuple(angle.slip_rad for angle in self._angles)
+            slips_rad = tuple([angle.slip_rad for angle in self._angles])
             self._rows.append(WatchedRow(row, self._watch.codes, slips_rad, self._faults.count))
 
 

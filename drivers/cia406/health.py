@@ -78,6 +78,8 @@ class Heartbeats:
         """Nodes whose heartbeat is overdue; each is reported once, and again after as long."""
         limit_s = LATE * self._period_s
         nobody = self._since_any_s > min(limit_s + ALLOWED * self.busy_s, MOST * self._period_s)
+        if not nobody and self._alive_s - min(self._heard_s.values(), default=self._alive_s) <= limit_s:
+            return ()  # no node's expected period is shorter
         found = tuple(n for n, s in self._heard_s.items() if nobody or self._alive_s - s > LATE * self._expected_s(n))
         for node in found:
             self.heard(node)

@@ -11,6 +11,8 @@ import select
 import time
 from collections import deque
 from contextlib import suppress
+from functools import lru_cache
+from string import hexdigits
 from typing import Any
 
 import can
@@ -18,7 +20,7 @@ from can.exceptions import error_check
 from can.interfaces.slcan import slcanBus
 
 _ACKNOWLEDGED = ("", "z", "Z")  # LAWICEL CANUSB manual, version 1.0D: command done, frame taken
-_CLASSIC = re.compile(r"t([0-9A-Fa-f]{3})([0-8])([0-9A-Fa-f]*)")
+_HEAD = re.compile(r"t([0-9A-Fa-f]{3})([0-8])")
 READ_BYTES = 4096  # what a port holds back
 NO_STAMP = 0.0  # such adapters send none; python-can puts the time of this program there, which is no adapter's
 LONGEST_LINE = 256  # a frame of CAN FD takes 139; a line without an end is junk, and may not fill the memory
@@ -165,11 +167,14 @@ def _read(descriptor: int) -> bytes | None:
 
 def _classic(line: str) -> can.Message | None:
     """A data frame with an identifier of 11 bits, "tIIILDD..", which nearly all are; None for all else."""
-    found = _CLASSIC.fullmatch(line)
-    if found is None:
+    head = _head(line[:5])
+    if head is None or len(line) != 5 + 2 * head[1] or line[5:].strip(hexdigits):
         return None
-    number, length, digits = found.groups()
-    size = int(length)
-    if len(digits) != 2 * size:
-        return None
-    return can.Message(NO_STAMP, int(number, 16), False, dlc=size, data=bytearray.fromhex(digits))
+    return can.Message(NO_STAMP, head[0], False, dlc=head[1], data=bytearray.fromhex(line[5:]))
+
+
+@lru_cache(maxsize=4096)  # a bus has few different ones
+def _head(text: str) -> tuple[int, int] | None:
+    """Identifier and length; None when it begins no plain frame."""
+    found = _HEAD.fullmatch(text)
+    return None if found is None else (int(found[1], 16), int(found[2]))

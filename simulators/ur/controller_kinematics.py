@@ -11,7 +11,7 @@ Manipulation", section 2.2 (Rodrigues); Shepperd, "Quaternion from rotation matr
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
 
@@ -159,7 +159,11 @@ class NominalArm:
 
     @classmethod
     def from_rig(cls, rig: Mapping[str, Any]) -> "NominalArm":
-        """The arm of a rig as `tomllib` gives it. ValueError unless it has six D-H joints, as it drives."""
+        """The arm of a rig as `tomllib` gives it. ValueError unless it has six D-H joints, as it drives.
+
+        `controller_link2_length_m` of [emulation]: by how much (m) link 2 of the controller is longer, as by a factory
+        calibration.
+        """
         arm = rig["arm"]
         if arm["model"] != "dh" or len(arm["joint"]) != 6:
             raise ValueError(
@@ -167,6 +171,8 @@ class NominalArm:
                 'emulated UR controller; it takes model = "dh" and six [[arm.joint]]'
             )
         links = [Link(j["a_m"], j["alpha_rad"], j["d_m"], j.get("theta_offset_rad", 0.0)) for j in arm["joint"]]
+        longer_m = rig.get("emulation", {}).get("controller_link2_length_m", 0.0)
+        links[1] = replace(links[1], a_m=links[1].a_m + longer_m * math.copysign(1.0, links[1].a_m))
         flange = arm.get("flange", {})
         origin = flange.get("origin_m", (0.0, 0.0, 0.0))
         return cls(links, frame_of((*origin, *flange.get("rotation_rad", (0.0, 0.0, 0.0)))))

@@ -86,6 +86,7 @@ class Emulation(msgspec.Struct, frozen=True):
     laser_direction_sigma_rad: Sigma = 0.0
     joint_repeatability_rad: Sigma = 0.0
     psd_noise_m: Sigma = 0.0
+    controller_link2_length_m: Sigma = 0.0  # by which the controller computes with a longer link 2 than the rig file
     laser_power_w: Sigma = 1e-3  # class 2 pointer (IEC 60825-1: at most 1 mW)
     position_noise_m: Sigma = 0.0  # of a tracker, on each axis
     target_sigma_m: Sigma = 0.0  # of its target at the flange

@@ -36,7 +36,7 @@ def controller(lengthened_m=0.0):
 def recorded(tmp_path):
     """A robot's stream as the RTDE driver declares it, along a path through the room."""
 
-    def made(arm, tool=NONE, samples=1500):
+    def made(arm, tool=NONE, samples=1500, name="recording.mcap", rig=RIG):
         t = np.linspace(0.0, 1.0, samples)[:, None]
         q = np.sin(2.0 * np.pi * t * np.array([1.0, 2.0, 3.0, 5.0, 7.0, 11.0]) + np.arange(6)) - [0, 1, 0, 1, 0, 0]
         poses = np.array([pose_of(arm.tool(row.tolist(), frame_of(tool))) for row in q])
@@ -45,9 +45,9 @@ def recorded(tmp_path):
             Channel("actual_tcp_pose_m_rad", "m, rad", (6,)),
             Channel("tcp_offset_m_rad", "m, rad", (6,)),
         )
-        path, number = tmp_path / "recording.mcap", np.arange(samples)
+        path, number = tmp_path / name, np.arange(samples)
         with RecordingWriter(
-            path, rig_text=rig_text(RIG), software="test", clock=Standing(), notes={"segment": "1"}
+            path, rig_text=rig_text(rig), software="test", clock=Standing(), notes={"segment": "1"}
         ) as writer:
             values = {
                 "actual_q_rad": q,
@@ -133,3 +133,45 @@ def test_columns_of_a_table_are_imported_and_are_no_cause_of_errors(tmp_path):
     assert not any(name.startswith("controller") for name in conditions_of(samples, {}).extra)
     assert np.allclose(samples.column("controller_x_m"), poses[:, 9], atol=1e-9)
     assert controller_notes(read(tmp_path / "session")) == ()
+
+
+def test_segments_of_one_robot_show_one_arm(recorded, tmp_path):
+    (tmp_path / "log").mkdir()
+    for number, tool in enumerate((TOOL, NONE), start=1):
+        recorded(controller(LENGTHENED_M), tool, name=f"log/segment-000{number}.mcap")
+    assert run(["check", str(tmp_path / "log"), "--controller-arm", str(tmp_path / "arm.toml")]) == 0
+    written = RigArm.of_rig(load_rig(tmp_path / "arm.toml"))
+    q = np.random.default_rng(2).uniform(-2.5, 2.5, (20, 6))
+    true = [controller(LENGTHENED_M).forward(row.tolist())[0][9:] for row in q]
+    assert np.abs(written.frames(q)[:, -1, :3, 3] - true).max() < 1e-8
+
+
+def test_segments_of_two_rig_files_are_refused(recorded, tmp_path, capsys):
+    (tmp_path / "log").mkdir()
+    (tmp_path / "other.toml").write_text(rig_text(RIG) + "\n# another\n")
+    recorded(controller(), TOOL, name="log/segment-0001.mcap")
+    recorded(controller(), TOOL, name="log/segment-0002.mcap", rig=tmp_path / "other.toml")
+    assert run(["check", str(tmp_path / "log"), "--controller-arm", str(tmp_path / "arm.toml")]) == 1
+    assert "segment-0002.mcap are recordings of different rig files; give each by itself" in capsys.readouterr().err
+    assert not (tmp_path / "arm.toml").exists()
+
+
+def test_a_table_of_the_rtde_recorder_is_read_as_it_is(recorded, tmp_path, capsys):
+    stream = read(recorded(controller(LENGTHENED_M), TOOL)[0]).streams["robot"]
+    names = {"actual_q": "actual_q_rad", "target_q": "actual_q_rad", "actual_TCP_pose": "actual_tcp_pose_m_rad"}
+    headings = ["timestamp", *(f"{name}_{k}" for name in names for k in range(6)), "actual_current_0"]
+    columns = (
+        stream.device_s[:, None],
+        *(stream.values[c] for c in names.values()),
+        stream.values["actual_q_rad"][:, :1],
+    )
+    np.savetxt(tmp_path / "rtde.csv", np.hstack(columns), header=" ".join(headings), comments="", fmt="%.15g")
+    out = tmp_path / "rtde.mcap"
+    assert run(["import", str(tmp_path / "rtde.csv"), "--streams", "--rig", str(RIG), "--out", str(out), "--yes"]) == 0
+    (log,) = read(out).streams.values()
+    np.testing.assert_allclose(log.host_s, stream.device_s, atol=1e-9)
+    np.testing.assert_allclose(log.values["target_q_rad"], stream.values["actual_q_rad"], atol=1e-12)
+    assert "actual_current_0" in log.values
+    capsys.readouterr()
+    (found,) = findings(out, capsys)
+    assert "another arm than the rig file: link2.length 500.0" in found["says"]

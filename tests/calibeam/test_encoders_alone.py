@@ -162,3 +162,27 @@ def test_a_rig_of_nothing_needs_an_arm(tmp_path: Path) -> None:
     (tmp_path / "rig.toml").write_text(RIG.read_text().replace("[1, 2, 3]", "[]"))
     with pytest.raises(RigFileError, match="names no encoder; give 'nodes'"):
         load_rig(tmp_path / "rig.toml", needs_arm=False)
+
+
+def test_a_diagnosis_of_encoders_alone_points_to_check_and_compare(
+    site: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(["diagnose", str(log_of(site)), "--out", str(tmp_path / "found.json")]) == 0
+    shown = capsys.readouterr().out
+    assert "settled samples" not in shown
+    assert "calibeam check LOG" in " ".join(shown.split())
+    assert "calibeam compare ONE TWO" in " ".join(shown.split())
+
+
+def test_a_table_of_encoders_is_imported_and_checked(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    time_s = np.arange(0.0, 2.0, 0.01)
+    rows = [",".join(map(repr, (t, t, 2.0 * t, 3.0 * t))) for t in time_s.tolist()]
+    (tmp_path / "log.csv").write_text("\n".join(["time [s],enc1 [rad],enc2 [rad],enc3 [rad]", *rows]))
+    arguments = ["import", str(tmp_path / "log.csv"), "--streams", "--rig", str(RIG), "--yes"]
+    assert run([*arguments, "--out", str(tmp_path / "log.mcap")]) == 0
+    (stream,) = read(tmp_path / "log.mcap").streams.values()
+    np.testing.assert_allclose(stream.values["position_rad"], np.outer(time_s, [1.0, 2.0, 3.0]))
+    assert run(["check", str(tmp_path / "log.mcap")]) == 0
+    assert "no errors" in capsys.readouterr().out
+    assert run([*arguments, "--out", str(tmp_path / "two.mcap"), "--columns", "enc1..enc3 [rad] = q"]) == 1
+    assert "q needs an arm, and the rig file has none; state enc" in capsys.readouterr().err

@@ -343,3 +343,9 @@ def test_a_bag_of_ros_1_is_read_and_its_stamps_are_what_the_user_states(
     assert "time stamp: sent" in capsys.readouterr().out
     assert run(["export", str(out), "--streams", "--out", str(tmp_path / "folder")]) == 0
     assert read(tmp_path / "folder").streams["joint_states"].stamps == "sent"
+
+
+def test_a_log_without_samples_is_judged_by_its_streams(tmp_path, way, capsys):
+    imported(tmp_path / "log.mcap", *logs(tmp_path, way, 0.01))
+    assert run(["check", str(tmp_path / "log.mcap")]) == 0
+    assert "no-samples" not in capsys.readouterr().out

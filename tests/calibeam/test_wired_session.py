@@ -1,8 +1,10 @@
 """Sessions over real wires: every way in which one can end early. Whole ones: test_same_on_wires.py."""
 
 import os
+import re
 import signal
 import threading
+import tomllib
 from collections.abc import Callable
 from contextlib import AbstractContextManager
 from pathlib import Path
@@ -13,16 +15,19 @@ import pytest
 from rich.console import Console
 
 from acquisition.recording import Recording, RecordingWriter, read
-from acquisition.recording.rig import Rig, rig_text
+from acquisition.recording.rig import Rig, load_rig, rig_text
 from acquisition.session.plan import PlanOptions
 from acquisition.session.stepping import Summary
+from calibeam.cli import run
 from calibeam.devices.recorder import record_session
 from calibeam.devices.site import addresses_of, connected
 from calibeam.emulation import Emulation
 from calibeam.outcome import PartialResult
 from calibeam.printing.progress import progress_bar
+from calibrate.model.arms.rig_arm import RigArm
 from drivers.clock import SystemClock
 from drivers.ur.reader import UrReader
+from simulators.ur.controller_kinematics import NominalArm
 
 from .conftest import brisk
 
@@ -139,6 +144,29 @@ def test_a_box_at_its_slowest_rate_serves_a_session(takes: Takes) -> None:
     psd = msgspec.structs.replace(takes.rig.devices.psd, rate_hz=100.0)
     takes.rig = msgspec.structs.replace(takes.rig, devices=msgspec.structs.replace(takes.rig.devices, psd=psd))
     assert len(takes.run().samples) == 12
+
+
+def test_a_controller_that_computes_with_another_arm_is_named_and_its_arm_written(
+    rig: Rig, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """RTDE poses of a controller whose link 2 is 0.5 mm longer than in the rig file of the recording."""
+    emulated = tmp_path / "emulated.toml"
+    emulated.write_text(rig_text(RIG).replace("[emulation]\n", "[emulation]\ncontroller_link2_length_m = 5e-4\n"))
+    with Emulation(emulated, seed=5, time_scale=8.0) as running:
+        takes = Takes(brisk(rig), running, tmp_path / "recording.mcap")
+        takes.run()
+    assert run(["check", str(takes.path), "--controller-arm", str(tmp_path / "arm.toml")]) == 0
+    shown = capsys.readouterr().out
+    assert "warning: controller-arm: stream robot: the controller computes with another arm than the rig file" in shown
+    assert re.search(r"link2\.length [-−]500\.0", shown)
+    q_rad = takes.recording().streams["robot"].values["actual_q_rad"][::200]
+    true = NominalArm.from_rig(tomllib.loads(emulated.read_text()))
+    true_m = np.array([true.forward(row)[0][9:] for row in q_rad.tolist()])
+    written, nominal = (
+        RigArm.of_rig(load_rig(path)).frames(q_rad)[:, -1, :3, 3] for path in (tmp_path / "arm.toml", RIG)
+    )
+    assert np.abs(written - true_m).max() < 1e-7
+    assert np.abs(nominal - true_m).max() > 4e-4
 
 
 def test_a_full_disk_stops_the_arm_and_keeps_what_was_written(takes: Takes, full_after: Callable) -> None:

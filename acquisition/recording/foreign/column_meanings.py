@@ -158,6 +158,8 @@ _OF_INTERFACES: Mapping[str, str] = MappingProxyType(
     {
         **dict.fromkeys(("actualq", "targetq"), "rad"),
         "actualqd": "rad/s",
+        "actualtcppose0": "m",
+        "actualtcppose3": "rad",
         **dict.fromkeys(("rax", "robax", "e6axisa", "$axisacta", "axisacta"), "deg"),
     }
 )
@@ -173,6 +175,8 @@ _SETS: Mapping[str, tuple[tuple[str, ...], ...]] = MappingProxyType(
         "wpr": (("w", "p", "r"),),
         "rotvec": (("rx", "ry", "rz"),),
         "camera-rotvec": (("camerarx", "camerary", "camerarz"),),
+        "controller-position": (("actualtcppose0", "actualtcppose1", "actualtcppose2"),),
+        "controller-rotvec": (("actualtcppose3", "actualtcppose4", "actualtcppose5"),),
         "quaternion": (("qw", "qx", "qy", "qz"), ("quatw", "quatx", "quaty", "quatz"), ("q1", "q2", "q3", "q4")),
         "matrix": tuple(tuple(f"{s}{i}{j}" for i in (1, 2, 3) for j in (1, 2, 3)) for s in "rmth"),
         POSE_MATRIX: tuple(tuple(f"{s}{i}{j}" for i in (1, 2, 3) for j in (1, 2, 3, 4)) for s in "mth"),
@@ -187,13 +191,17 @@ _TIMES = ("t", "time", "timestamp", "zeit", "host")
 _ORIENTATIONS = ("abc", "wpr", "rotvec", "quaternion", "matrix")
 
 
-def understood(sheet: Sheet, n_joints: int, columns: str = "") -> tuple[Group, ...]:
+def understood(sheet: Sheet, n_joints: int, columns: str = "", *, with_arm: bool = True) -> tuple[Group, ...]:
     """Which columns mean what: as `columns` states, and for the rest by the headings.
 
+    Without an arm `n_joints` counts the encoders, and their angles are the only columns of one a joint.
     SamplesError for a statement that cannot be read or found, and where several columns might be meant.
     """
     stated = tuple(_stated(sheet, n_joints, columns))
-    return (*stated, *_Headings(sheet, n_joints, stated).groups())
+    per_joint_meanings = tuple(PER_JOINT) if with_arm else ("enc",)
+    if wrong := next((g for g in stated if g.meaning in PER_JOINT and g.meaning not in per_joint_meanings), None):
+        raise SamplesError(f"--columns: {wrong.meaning} needs an arm, and the rig file has none; state enc")
+    return (*stated, *_Headings(sheet, n_joints, stated).groups(per_joint_meanings))
 
 
 def name_of(sheet: Sheet, column: int) -> str:
@@ -228,9 +236,13 @@ class _Headings:
             if column not in taken and sheet.headings[column]:
                 self._free.setdefault(folded(name_of(sheet, column)), []).append(column)
 
-    def groups(self) -> Iterator[Group]:
-        yield from self._single((TIME,), lambda _: _TIMES)
-        for meaning in PER_JOINT:
+    def groups(self, per_joint_meanings: Sequence[str]) -> Iterator[Group]:
+        of_rtde = any(
+            name in self._free for name in ("actualq0", "targetq0", "actualtcppose0")
+        )  # its time is in seconds
+        for group in self._single((TIME,), lambda _: _TIMES):
+            yield replace(group, unit="s") if of_rtde and not group.unit else group
+        for meaning in per_joint_meanings:
             yield from self._per_joint(meaning)
         yield from self._sets()
         names = [name for name in SINGLE if name != TIME]
@@ -251,8 +263,7 @@ class _Headings:
             raise SamplesError(f"{self._sheet.place()}: {meaning} may be {names}{differ}; {self._remedy(meaning)}")
         if whole:
             ((stem, columns),) = whole.items()
-            group = self._taken(meaning, columns)
-            yield group if group.unit else replace(group, unit=_OF_INTERFACES.get(stem, ""))
+            yield self._taken(meaning, columns, stem)
         elif meaning == "q" and (most := max(found.values(), key=len)):
             raise SamplesError(
                 f"{self._sheet.place()}: {len(most)} joint angles ({self._names(most)}) for an arm of {self._n} "
@@ -279,8 +290,8 @@ class _Headings:
 
     def _sets(self) -> Iterator[Group]:
         for meaning, ways in _SETS.items():
-            bare = meaning.removeprefix(CAMERA)
-            prefix = CAMERA if meaning.startswith(CAMERA) else ""
+            bare = bare_meaning(meaning)
+            prefix = meaning.removesuffix(bare)
             rivals = {prefix + other for other in _ORIENTATIONS} if bare in _ORIENTATIONS else {meaning}
             if bare == POSE_MATRIX:
                 rivals |= {"position", *_ORIENTATIONS}
@@ -293,7 +304,7 @@ class _Headings:
                 names = " or ".join(self._names([self._free[name][0] for name in way]) for way in there)
                 raise SamplesError(f"{self._sheet.place()}: {meaning} may be {names}; {self._remedy(meaning)}")
             if there:
-                yield self._taken(meaning, tuple(self._only(self._free[name]) for name in there[0]))
+                yield self._taken(meaning, tuple(self._only(self._free[name]) for name in there[0]), there[0][0])
 
     def _single(self, names: Sequence[str], headings: Callable[[str], tuple[str, ...]]) -> Iterator[Group]:
         for name in names:
@@ -311,7 +322,8 @@ class _Headings:
             raise SamplesError(f"{self._sheet.place()}: two columns are named '{name}'; rename one")
         return columns[0]
 
-    def _taken(self, meaning: str, columns: tuple[int, ...]) -> Group:
+    def _taken(self, meaning: str, columns: tuple[int, ...], name: str = "") -> Group:
+        """`name`: the folded heading, for the unit of an interface where none stands."""
         self._meant.add(meaning)
         for column in columns:
             self._free.pop(folded(name_of(self._sheet, column)), None)
@@ -320,7 +332,7 @@ class _Headings:
                 self._free.pop(name, None)
             moved = [c for i, c in enumerate(columns) if i % 4 == 3]
             return Group(meaning, columns, common_unit(self._sheet, moved))
-        return Group(meaning, columns, common_unit(self._sheet, columns))
+        return Group(meaning, columns, common_unit(self._sheet, columns) or _OF_INTERFACES.get(name, ""))
 
     def _names(self, columns: Sequence[int]) -> str:
         names = [shown(self._sheet.headings[c], 30) for c in columns]

@@ -136,7 +136,7 @@ def understand(
     SamplesError, RigFileError naming the place, the value and the remedy.
     """
     rig = parse_rig(rig_text, rig_name)
-    groups = understood(sheet, rig.n_joints, columns)
+    groups = understood(sheet, rig.n_encoders, columns, with_arm=rig.n_joints > 0)
     numbers: dict[int, Floats] = {}
     for group in groups:
         if group.meaning == UNUSED or group.meaning == TIME or group.meaning in TEXT:
@@ -324,7 +324,7 @@ def write_columns(about: Sequence[ColumnsFile], out: Path) -> Path:
 
 
 def _record(table: Understanding, group: Group, samples: Samples | None) -> ColumnRecord:
-    targets = group.targets(table.rig.n_joints)
+    targets = group.targets(table.rig.n_encoders)
     alike = [k for k, t in enumerate(targets) if t not in TEXT and suffix_of(t) == suffix_of(targets[0])]
     if samples is None:
         values = converted(table, group)[:, alike].ravel()

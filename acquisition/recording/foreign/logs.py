@@ -32,6 +32,7 @@ from acquisition.recording.foreign.conversion import (
 )
 from acquisition.recording.foreign.heading_units import si_symbol, unit_of
 from acquisition.recording.foreign.sheet import SUFFIXES, Raw, Sheet, read_sheet
+from acquisition.recording.mcap.layout import STREAMS_NOTE
 from acquisition.recording.mcap.scan import check_batches
 from acquisition.recording.recording import Channel, Recording, Stamps, Stream, check_declaration
 from acquisition.recording.sample_rules import no_samples
@@ -133,6 +134,7 @@ def recording_of(
         samples=no_samples(first.rig),
         complete=True,
         streams={stream.name: stream for stream in streams},
+        notes={STREAMS_NOTE: ", ".join(stream.name for stream in streams)},
     )
     return recording, start.started_utc
 
@@ -224,7 +226,7 @@ def _channels(table: Understanding, group: Group) -> Iterator[tuple[Channel, NDA
     prefix = prefix_of(group.meaning)
     if group.meaning in _JOINT_CHANNELS:
         if group.joints:
-            some, values = values, np.full((len(values), table.rig.n_joints), np.nan)
+            some, values = values, np.full((len(values), table.rig.n_encoders), np.nan)
             values[:, np.array(group.joints) - 1] = some
         yield Channel(_JOINT_CHANNELS[group.meaning], _UNITS.get(group.meaning, "rad"), values.shape[1:]), values
     elif group.meaning.endswith(("position", POSE_MATRIX)):
@@ -235,7 +237,7 @@ def _channels(table: Understanding, group: Group) -> Iterator[tuple[Channel, NDA
         yield Channel(f"{prefix}rotation_rad", "rad", (3,)), values
     else:
         unit = si_symbol(group.suffix) or group.unit
-        for name, column in zip(group.targets(table.rig.n_joints), values.T, strict=True):
+        for name, column in zip(group.targets(table.rig.n_encoders), values.T, strict=True):
             yield Channel(name, unit), column
 
 

@@ -250,10 +250,14 @@ def _decoded(content: bytes, path: Path) -> str:
 
 
 def _separator(text: str) -> str:
-    """The first of `;`, tab and comma that parts the most filled of the first rows alike."""
+    """The first of `;`, tab and comma that parts the most filled of the first rows alike; a space where there is none.
+
+    The recorder of Universal Robots' RTDE client writes spaces.
+    """
     lines = [line for line in io.StringIO(text[:1_000_000]) if line.strip()][:200]
     counts = {mark: [line.count(mark) for line in lines] for mark in SEPARATORS}
-    return max(SEPARATORS, key=lambda mark: (sum(1 for n in counts[mark] if n), mark != ","))
+    best = max(SEPARATORS, key=lambda mark: (sum(1 for n in counts[mark] if n), mark != ","))
+    return best if any(counts[best]) else " "
 
 
 def _workbook(path: Path, wanted: str | None, header_row: int | None) -> Sheet:

@@ -360,6 +360,7 @@ EMULATION_KEYS = (
     "laser_direction_sigma_rad",
     "joint_repeatability_rad",
     "psd_noise_m",
+    "controller_link2_length_m",
     "laser_power_w",
     "camera_origin_sigma_m",
     "camera_rotation_sigma_rad",
@@ -420,6 +421,11 @@ class Rig(Struct, frozen=True, forbid_unknown_fields=True):
     def n_joints(self) -> int:
         """0 of a rig without an arm."""
         return len(self.arm.joints)
+
+    @property
+    def n_encoders(self) -> int:
+        """One a joint; of a rig without an arm as many as are named."""
+        return self.n_joints or (0 if self.devices.encoders is None else len(self.devices.encoders.named))
 
     @property
     def placements(self) -> Mapping[int, Placement]:
