@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from acquisition.guided.reading import Contact, Reading
 from acquisition.guided.touch import FEWEST, Advice
 from acquisition.recording.rig import Rig, Tolerance
+from acquisition.recording.samples import PLANE, SEAT
 from calibeam.guided.judge import ZERO_RAD, assumed_prior, prepared, refit_arm, telling
 from calibeam.guided.recorded import AssumedGuidedArm
 from calibrate.errors import DataError
@@ -74,10 +75,10 @@ class ContactJudge:
         here = [one for one in self._kept if one.target == contact]
         if not here:
             return Advice("bring the ball there in any posture")
-        if not self._fitted or (contact.kind == "plane" and len(here) < FEWEST["plane"]):
+        if not self._fitted or (contact.kind == PLANE and len(here) < FEWEST[PLANE]):
             return Advice("touch it elsewhere, with the tool leaning another way")
         candidates = self._candidates(contact, here)
-        elsewhere = self._elsewhere(here) if contact.kind == "seat" else []
+        elsewhere = self._elsewhere(here) if contact.kind == SEAT else []
         used = telling([(one,) for one in (*self._kept, *candidates, *elsewhere)])
         if not candidates or not any(visit[0] is candidates[0] for visit in used):
             return Advice("touch it elsewhere, with the tool leaning another way")
@@ -108,7 +109,7 @@ class ContactJudge:
         arm, q_rad = self._arm(), np.array([one.q_rad for one in here])
         point_m = arm.tip_m(q_rad).mean(axis=0)
         return [
-            Reading(Contact("seat", NOWHERE + k, "elsewhere"), one, 0.0, 0.0)
+            Reading(Contact(SEAT, NOWHERE + k, "elsewhere"), one, 0.0, 0.0)
             for k, (scale, up_m) in enumerate(ELSEWHERE)
             for one in self._postures(arm, scale * point_m + np.array([0.0, 0.0, up_m]), q_rad[-1])
         ]
@@ -166,7 +167,7 @@ class ContactJudge:
         own_m = tips_m[next(k for k, other in enumerate(readings) if other is one)]
         apart_m: dict[Contact, float] = {}
         for contact in {other.target for other in self._kept if isinstance(other.target, Contact)}:
-            if contact.kind == "seat":
+            if contact.kind == SEAT:
                 rows = [k for k, other in enumerate(readings) if other.target == contact and _within(other, self._kept)]
                 apart_m[contact] = float(np.linalg.norm(own_m - tips_m[rows].mean(axis=0)))
         number = 1 + next(k for k, other in enumerate(readings) if other is one)

@@ -123,7 +123,7 @@ class TouchFolder:
         names = {kind: samples.integers(kind, 0) for kind in (SEAT, PLANE) if kind in samples}
         for row, (t_s, q_rad) in enumerate(zip(samples.column("t_s"), samples.joints(), strict=True)):
             kind, numbers = next((kind, ids) for kind, ids in names.items() if ids[row] > 0)
-            contact = Contact("plane" if kind == PLANE else "seat", int(numbers[row]), f"{kind} {numbers[row]}")
+            contact = Contact(PLANE if kind == PLANE else SEAT, int(numbers[row]), f"{kind} {numbers[row]}")
             self.earlier.append(Reading(contact, q_rad, float(t_s), 0.0))
         pause_s = max(0.0, time.time() - (self.path / CSV).stat().st_mtime)
         self.offset_s = self.earlier[-1].t_s + pause_s
@@ -230,7 +230,7 @@ class EmulatedPerson:
 
     def _place_m(self, contact: Contact) -> list[float]:
         """Blocks about the arm at two heights; a plane is touched anywhere."""
-        if contact.kind == "plane":
+        if contact.kind == PLANE:
             x_m, y_m = self.rng.uniform(0.35, 0.6), self.rng.uniform(-0.3, 0.3)
             return [float(x_m), float(y_m), 0.08 + 0.1 * contact.id]
         turn_rad, reach_m = 0.9 * contact.place, 0.42 + 0.06 * (contact.place % 3)

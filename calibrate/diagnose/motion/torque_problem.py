@@ -1,6 +1,6 @@
 """Torques of rigid links and of terms beside them as one least-squares problem, for the solvers of calibrate/fit.
 
-Numbers of links that no motion tells apart stay where their priors have them; where the rig file states masses the
+Numbers of links that no motion separates stay where their priors have them; where the rig file states masses the
 priors are those of a drawing, else they are wide.
 """
 
@@ -114,7 +114,7 @@ class TorqueProblem:
         return np.sqrt(self.weights) / (self.sigma_nm[self.joint] * np.sqrt(1.0 - self.kept**2))
 
     def whitened(self, values: Floats) -> Floats:
-        """(datum, ...) of values (datum, ...) in Nm: each less what the one before it tells of it.
+        """(datum, ...) of values (datum, ...) in Nm: each less what the one before it predicts.
 
         Noise as a first-order autoregression: Brockwell, Davis, Time Series: Theory and Methods, 1991, section 3.1.
         """

@@ -77,7 +77,7 @@ class Drivers(Conditions):
 
     @property
     def clock_is_a_cause(self) -> bool:
-        """Whether a curve over time says anything: in one motion everything is some function of time."""
+        """Whether a curve over time means anything: in one motion everything is some function of time."""
         return True
 
     def of_session(self, values: Values) -> Values:

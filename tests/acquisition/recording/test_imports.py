@@ -37,6 +37,7 @@ DOORS = {  # single modules that are open beside the faces: vocabularies, and wh
             "files.bounds",
             "mcap.layout",
             "pose_plan",
+            "restored_stamps",
             "rig.devices",
             "rig.schema",
             "samples",

@@ -2,7 +2,7 @@
 
 from calibrate.model.effects.kind import Kind
 from calibrate.model.effects.term import Term
-from calibrate.model.effects.torque import drives, friction, loads
+from calibrate.model.effects.torque import drives, friction, masses_and_springs
 from calibrate.model.effects.torque.motion_drivers import MotionDrivers, torque_port
 
 TORQUES: tuple[Kind, ...] = (
@@ -12,10 +12,10 @@ TORQUES: tuple[Kind, ...] = (
     friction.LOADED,
     friction.COLD,
     friction.RUN_IN,
-    loads.ROTOR,
-    loads.PAYLOAD,
-    loads.GRAVITY,
-    loads.SPRING,
+    masses_and_springs.ROTOR,
+    masses_and_springs.PAYLOAD,
+    masses_and_springs.GRAVITY,
+    masses_and_springs.SPRING,
     drives.CONSTANT,
     drives.OFFSET,
     drives.RIPPLE,

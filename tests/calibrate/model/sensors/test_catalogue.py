@@ -24,6 +24,7 @@ MODEL = ROOT / "calibrate" / "model"
 OWN = ("sensors", "optics")  # folders of sensors and of what they are made of
 # Why a file may spell a sensor's name.
 SPELLED = {
+    "calibeam/commands/session.py": "names of the options of the command",
     "calibeam/prove": "families of the simulator's scenarios, which have the proof's own names",
     "calibeam/guided/run.py": "verbs of the emulated hand",
     "calibrate/model/older_models.py": "keys of model files of version 1",

@@ -1,4 +1,4 @@
-"""What a joint has to move or hold beside the links as drawn: rotors, a payload, leaning gravity, springs and hoses."""
+"""What a joint has to move or hold beside the nominal links: rotors, a payload, leaning gravity, springs and hoses."""
 
 import numpy as np
 
