@@ -107,6 +107,7 @@ def _print_details(console: Console, file: DiagnosisFile) -> None:
         console.print(line, highlight=False, markup=False)
     if file.splits:
         console.print(_proof(file))
+    _print_torques(console, file)
     for one in file.incomplete:
         console.print(f"not completed: {one.stage}: {one.reason}", highlight=False, markup=False)
     for line in file.next:
@@ -125,11 +126,15 @@ def print_streams(console: Console, file: DiagnosisFile) -> None:
         lines += [f"not tested: {says}" for says in file.streams.unseen]
     for line in lines:
         console.print(line, highlight=False, markup=False)
+    _print_torques(console, file)
+    for line in (*_unexplained(file), *(f"next: {says}" for says in file.next)):
+        console.print(line, highlight=False, markup=False)
+
+
+def _print_torques(console: Console, file: DiagnosisFile) -> None:
     if file.torques is not None:
         console.print(_torques(file.torques))
         console.print(file.torques.made, highlight=False, markup=False)
-    for line in (*_unexplained(file), *(f"next: {says}" for says in file.next)):
-        console.print(line, highlight=False, markup=False)
 
 
 def _torques(found: TorquesRecord) -> Table:

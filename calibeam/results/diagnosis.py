@@ -14,7 +14,7 @@ from calibeam.results.controller_findings import controller_notes
 from calibeam.software import SOFTWARE
 from calibrate.diagnose.assess import Verdict
 from calibrate.diagnose.from_recording import Diagnosed, diagnose_samples
-from calibrate.diagnose.motion import diagnose_torques, with_torques
+from calibrate.diagnose.motion import TorqueDiagnosis, diagnose_torques, with_torques
 from calibrate.diagnose.new_poses import plan_of, separating
 from calibrate.diagnose.record.file import write_diagnosis
 from calibrate.diagnose.record.schema import (
@@ -90,7 +90,7 @@ def diagnose_streams(recording: Recording) -> DiagnosisFile:
         software=SOFTWARE,
         rig=RigRecord(recording.rig.name, rig_sha256(recording.rig_text)),
     )
-    file = with_torques(with_streams(nothing, report), diagnose_torques(recording, np.random.default_rng(SEED)))
+    file = with_torques(with_streams(nothing, report), _torques_of(recording))
     agree = file.verdict == Verdict.CONSISTENT.value
     return msgspec.structs.replace(file, verdict=Verdict.UNDECIDABLE.value) if agree else file
 
@@ -118,8 +118,13 @@ def _diagnosed(
 def _with_streams(file: DiagnosisFile, recording: Recording, found: Diagnosed) -> DiagnosisFile:
     stages, fitted = Stages(), None if found.physics is None else found.physics.model
     whole = stages.attempt(Stage.STREAMS, lambda: with_streams(file, streams_of(recording, fitted)), file)
+    whole = stages.attempt(Stage.TORQUES, lambda: with_torques(whole, _torques_of(recording)), whole)
     failed = tuple(IncompleteRecord(one.stage.value, one.reason) for one in stages.failed)
     return msgspec.structs.replace(whole, incomplete=(*whole.incomplete, *failed))
+
+
+def _torques_of(recording: Recording) -> TorqueDiagnosis | None:
+    return diagnose_torques(recording, np.random.default_rng(SEED))
 
 
 def plan_next(found: Diagnosed, path: Path) -> str:

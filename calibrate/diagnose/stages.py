@@ -39,6 +39,7 @@ class Stage(Enum):
     DETECTION = "detection limits"
     CONFUSABLE = "causes that the poses confuse"
     STREAMS = "streams"
+    TORQUES = "torques in motion"
 
 
 # Whoever has not been through all of these does not know whether something is there.

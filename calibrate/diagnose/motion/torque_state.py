@@ -17,8 +17,9 @@ from calibrate.diagnose.motion.torque_problem import TorqueProblem, plain_sizes
 from calibrate.diagnose.state.linearised import UnseenMisfits, WhitenedRows
 from calibrate.fit.noise import Scatter, likelihood_of, scatter_of
 from calibrate.fit.solvers import NEAR_START, solve
+from calibrate.model.arms.inverse_dynamics import NUMBERS
 from calibrate.model.effects.term import Accepted, Term
-from calibrate.model.effects.torque import MotionDrivers, torque_terms
+from calibrate.model.effects.torque import LOADS, PAYLOAD, MotionDrivers, torque_terms
 from calibrate.model.parameters import plausible_sizes, priors, start_values
 
 Floats = NDArray[np.float64]
@@ -112,8 +113,8 @@ class TorqueState:
         return _settled(self, problem, np.concatenate([self.links, *values]))
 
     def renewed(self) -> "TorqueState":
-        """With the torque of the links as now fitted."""
-        drivers = with_torque(self.drivers, self.links)
+        """With the load as now fitted."""
+        drivers = with_torque(self.drivers, self.links, self.accepted)
         whole, problem = replace(self.whole, drivers=drivers), replace(self.problem, drivers=drivers)
         return _settled(replace(self, whole=whole), problem, self.theta)
 
@@ -209,11 +210,18 @@ def _likelihood(problem: TorqueProblem, misfit: Floats) -> tuple[float, Floats]:
     return value - 2.0 * float(np.sum(np.log(alone.scale))), weights
 
 
-def with_torque(drivers: MotionDrivers, links: Floats) -> MotionDrivers:
-    """With the torque of these links at every moment: of joints that stand or turn back, too."""
-    n = drivers.n_joints
-    torque = (drivers.link_columns @ links).reshape(-1, n)
+def with_torque(drivers: MotionDrivers, links: Floats, terms: Sequence[Accepted] = ()) -> MotionDrivers:
+    """With the load of these links, and of what the terms add to it, at every moment, also of joints that stand."""
+    n, carried = drivers.n_joints, links.copy()
+    for a in terms:
+        if a.term.physics == PAYLOAD.physics:
+            last = len(NUMBERS) * (n - 1)
+            carried[last : last + len(a.coefficients)] += a.coefficients
+    torque = (drivers.link_columns @ carried).reshape(-1, n)
+    for a in terms:
+        if a.term.physics in LOADS:
+            torque = torque + a.at(drivers)
     rate = np.gradient(torque, drivers.t_s, axis=0)
     extra = {**drivers.extra, **{f"tau{i + 1}": torque[:, i] for i in range(n)}}
-    tilted = (drivers.lean_columns @ links).reshape(-1, n, 2)
+    tilted = (drivers.lean_columns @ carried).reshape(-1, n, 2)
     return replace(drivers, torque_nm=torque, torque_rate_nm_s=rate, tilted=tilted, extra=extra)

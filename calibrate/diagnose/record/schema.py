@@ -281,7 +281,7 @@ def no_better_with_physics(file: DiagnosisFile) -> str:
 
     It has to be better on unseen rows for certain, by one way to split at least, and worse for certain by none.
     """
-    if not file.findings:
+    if not any(one.stream is None for one in file.findings):
         return "no cause was found beside the geometry"
     sure = [(one.removed_low, one.removed_high) for one in file.splits]
     known = [(low, high) for low, high in sure if low is not None and high is not None]

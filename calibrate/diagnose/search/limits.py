@@ -20,6 +20,7 @@ ALPHA_DRIFT = 0.05
 ALPHA_FURTHER = 0.01  # probability; of every further term, and of an effect without a name (doubts/unknown.py)
 # probability; of a term that no machine is without (friction), by the null of the whole catalogue
 ALPHA_USUAL = 0.1
+USUAL_WORTH = 10.0  # BIC, besides: very strong evidence (Kass, Raftery 1995, section 3.2)
 # count; ALPHA_FIRST and ALPHA_FURTHER are shared by fast and slow terms (Bonferroni), but for slow ones where noise
 # wanders: the law overstates the wander
 FAMILIES = 2

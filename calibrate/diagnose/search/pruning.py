@@ -70,7 +70,7 @@ def confirmed(at: Search) -> Search:
     """Each term against the null of the final residual; the least significant one goes first.
 
     One null for all: what goes would be taken for noise that wanders in the next one, and take others with it. What is
-    usual has a level of its own: nobody had to search for it.
+    usual has a level of its own, nobody had to search for it; it has to be worth something, too.
     """
     null = null_at(at.bench, at.rng) if at.state.accepted else None
     while null is not None and at.state.accepted:
@@ -79,6 +79,8 @@ def confirmed(at: Search) -> Search:
         usual = np.array([a.term.key in at.usual for a in at.state.accepted])
         alpha = np.where(usual, limits.ALPHA_USUAL, limits.ALPHA_FURTHER if len(usual) > 1 else limits.ALPHA_FIRST)
         values = np.array([p[a.term.key] for a in at.state.accepted]) / alpha
+        worth = np.array([gain_of(gone, at.bench.sight) for gone in at.bench.gone])
+        values[usual & (worth < limits.USUAL_WORTH)] = np.inf
         worst = int(np.argmax(values))
         if values[worst] <= 1.0:
             return at

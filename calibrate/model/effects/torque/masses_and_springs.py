@@ -126,3 +126,4 @@ SPRING = Kind(
     "Khalil, Dombre, Modeling, Identification and Control of Robots, 2002, section 9.3.5 (springs)",
     _spring,
 )
+LOADS = frozenset(kind.physics for kind in (GRAVITY, ROTOR, SPRING))  # that gear and bearings feel beside a payload
