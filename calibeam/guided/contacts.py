@@ -35,6 +35,7 @@ ELSEWHERE = ((0.75, 0.15), (1.1, 0.0))  # of the place: nearer and higher (m), f
 OFTEN = 1e3  # times every candidate: what is uncertain then, stays so; more would drown the priors in rounding
 OPEN = 0.5  # of the prior sigma: a zero that is no better known is not determined
 TURN_RAD = 0.15  # smaller turns are not asked for
+SEATED = 5.0  # sigmas of the stated seat: no contradiction to the others
 NEARER = 4.0  # a reading belongs to another seat that it is nearer to by this factor
 
 
@@ -69,7 +70,7 @@ class ContactJudge:
         self._kept = [one for one in readings if not _within(one, dropped)]
         new = [one for one in dropped if not _within(one, self._reported)]
         self._reported = dropped
-        return tuple(self._contradiction(one, readings) for one in new)
+        return tuple(filter(None, (self._contradiction(one, readings) for one in new)))
 
     def advice(self, contact: Contact, readings: Sequence[Reading]) -> Advice:
         here = [one for one in self._kept if one.target == contact]
@@ -174,6 +175,8 @@ class ContactJudge:
         text = f"reading {number} contradicts the others of {one.target.says}"
         if isinstance(one.target, Contact) and one.target in apart_m:
             miss_m = apart_m.pop(one.target)
+            if miss_m < SEATED * (self._rig.noise.seat_m or 0.0):
+                return ""  # a fit of few readings leaves out what is as well seated as stated
             text += f", by {1e3 * miss_m:.1f} mm"
             nearest = min(apart_m, key=lambda contact: apart_m[contact], default=None)
             if nearest is not None and NEARER * apart_m[nearest] < miss_m:

@@ -256,6 +256,12 @@ def run_touch(
     if rig.tool.point_m is None:
         raise AcquisitionError(f"rig {rig.name}: [tool] has no point_m; give the ball's place at the flange, about")
     clock = SystemClock()
+    if options.seats and known.distance_m is None and not rig.known_distances:
+        console.print(
+            "no --distance: the size of the arm stays open; add [[known_distance]] to the rig file before identify",
+            highlight=False,
+            markup=False,
+        )
     judge = ContactJudge(parse_rig((folder.path / RIG).read_text(encoding="utf-8"), RIG), known.zero_sigma_rad,
                          np.random.default_rng(seed))  # fmt: skip
     earlier = folder.named(options.contacts())
@@ -274,6 +280,9 @@ def run_touch(
             folder.discard()
             raise
         raise PartialResult(f"{reason}; contacts kept in {folder.path}: {len(taken)}; --continue goes on") from why
+    if not taken:
+        folder.discard()
+        raise PartialResult("no contact was taken; nothing is kept")
     console.print(f"contacts: {len(taken)}, in {folder.path}", highlight=False, markup=False)
     if session.advice.open_joints:
         names = ", ".join(map(str, session.advice.open_joints))

@@ -118,7 +118,7 @@ def print_streams(console: Console, file: DiagnosisFile) -> None:
     """Of a recording without samples: each clock with its uncertainty, findings, and what the streams do not show."""
     count = len(file.findings)
     found = f"{counted(count, 'cause')} found" if count else "no fault found"
-    console.print(f"\nStreams only: {found}. The recording has no samples.", style="bold", highlight=False)
+    console.print(f"\nStreams only: {found}; no settled poses were recorded.", style="bold", highlight=False)
     lines = [line for number, finding in enumerate(file.findings, start=1) for line in _finding(number, finding)]
     if file.streams is not None:
         lines += [line for clock in file.streams.clocks for line in _clock(clock)]

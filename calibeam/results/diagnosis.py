@@ -91,6 +91,8 @@ def diagnose_streams(recording: Recording) -> DiagnosisFile:
         rig=RigRecord(recording.rig.name, rig_sha256(recording.rig_text)),
     )
     file = with_torques(with_streams(nothing, report), _torques_of(recording))
+    if file.torques is not None:
+        file = msgspec.structs.replace(file, next=tuple(one for one in file.next if one not in nothing.next))
     agree = file.verdict == Verdict.CONSISTENT.value
     return msgspec.structs.replace(file, verdict=Verdict.UNDECIDABLE.value) if agree else file
 

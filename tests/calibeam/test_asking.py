@@ -30,6 +30,7 @@ CUE, PLACE_CUE = "Type go to move, no to leave it: ", "ENTER to go on, q to end:
 PRODUCT = ("acquisition", "calibeam", "calibrate", "drivers", "simulators")
 # Every module that asks, or hands on who is asked.
 ASKS = {
+    "calibeam/guided/touched.py",
     "calibeam/commands/camera.py",
     "calibeam/commands/centre.py",
     "calibeam/commands/import_files.py",

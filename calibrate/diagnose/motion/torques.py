@@ -17,7 +17,7 @@ from calibrate.diagnose.diagnose import diagnose
 from calibrate.diagnose.motion.motion_table import Motion, motion_of
 from calibrate.diagnose.motion.torque_problem import TorqueProblem, link_parameters
 from calibrate.diagnose.motion.torque_state import TorqueState, with_torque
-from calibrate.diagnose.record.schema import DiagnosisFile, JointTorqueRecord, TorquesRecord
+from calibrate.diagnose.record.schema import TORQUE, DiagnosisFile, JointTorqueRecord, TorquesRecord
 from calibrate.diagnose.record.to_file import finding_record, unexplained_record
 from calibrate.model.arms.catalogue import arm_of
 from calibrate.model.arms.inverse_dynamics import torque_columns
@@ -27,7 +27,6 @@ from calibrate.model.parameters import start_values
 
 Floats = NDArray[np.float64]
 
-STREAM = "torque"
 JUDGED = "last block"  # the split that a motion is judged by: single moments are half known by their neighbours
 
 
@@ -144,12 +143,12 @@ def with_torques(file: DiagnosisFile, found: TorqueDiagnosis | None) -> Diagnosi
     if found is None:
         return file
     said = found.diagnosis
-    findings = tuple(structs.replace(finding_record(one, None), stream=STREAM, curve=None) for one in said.findings)
+    findings = tuple(structs.replace(finding_record(one, None), stream=TORQUE, curve=None) for one in said.findings)
     left = tuple(unexplained_record(one, None) for one in said.unexplained)
     first = left[0] if left and file.unexplained is None else file.unexplained
     verdict = said.verdict.value
-    if file.verdict == Verdict.MISMATCH.value or verdict == Verdict.CONSISTENT.value:
-        verdict = file.verdict
+    if file.samples or file.verdict == Verdict.MISMATCH.value or verdict == Verdict.CONSISTENT.value:
+        verdict = file.verdict  # what a drive takes is no fault of settled poses
     return structs.replace(
         file,
         verdict=verdict,

@@ -94,6 +94,9 @@ class StreamsRecord(Record, frozen=True):
     unseen: Many[Sentence]
 
 
+TORQUE = "torque"  # the `stream` of findings in torques
+
+
 class JointTorqueRecord(Record, frozen=True):
     """Torques of one joint, Nm rms; what the model leaves on the end of the motion, which neither fit has seen."""
 

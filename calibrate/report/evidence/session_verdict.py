@@ -13,11 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import fdtrc
 
-from calibrate.diagnose.record.schema import DiagnosisFile, SplitRecord, no_better_with_physics
+from calibrate.diagnose.record.schema import TORQUE, DiagnosisFile, SplitRecord, no_better_with_physics
 from calibrate.fit.accuracy import Alarm, checks_nothing
 from calibrate.fit.solvers import Status
 from calibrate.model.model_file import Fields, ModelFile, UnseenRows
-from calibrate.model.sensors.catalogue import kind_of
+from calibrate.model.sensors.catalogue import SOURCES, kind_of
 from calibrate.quantities import counted, significant
 from calibrate.report.elements.verdict import (
     AGAIN,
@@ -104,7 +104,7 @@ def session_verdict(evidence: SessionEvidence, diagnosis: DiagnosisFile | None =
     model = evidence.model
     for_care = [*_reasons(evidence), *_reasons_of_rank(evidence), *_reasons_of_diagnosis(diagnosis, model)]
     reasons = tuple(says for says, _ in for_care)
-    advice = tuple(dict.fromkeys((*(do for _, do in for_care if do), *_harmless(scatter(model)))))
+    advice = tuple(dict.fromkeys((*(do for _, do in for_care if do), *_harmless(scatter(model), model.noise))))
     if model.status in FAILED:
         return VerdictBox(Trust.NONE, f"No usable model: {model.says}.", reasons, (AGAIN, *advice))
     if checks_nothing(evidence.spare):
@@ -215,7 +215,7 @@ def _reasons_of_diagnosis(found: DiagnosisFile | None, model: ModelFile) -> Iter
     if found is None or found.verdict == "consistent" or (found.verdict == "mismatch" and model.session):
         return
     if found.verdict == "mismatch":
-        causes = counted(len(found.findings), "cause")
+        causes = counted(sum(one.stream != TORQUE for one in found.findings), "cause")
         no_better = no_better_with_physics(found) if found.findings else ""
         yield (
             f"Geometry alone does not explain the readings: the diagnosis found {causes}"
@@ -252,13 +252,20 @@ def _reasons_of_scatter(found: ScatterTest | None, repeats: Repeated | None) -> 
         )
 
 
-def _harmless(found: ScatterTest | None) -> Iterator[str]:
+def _harmless(found: ScatterTest | None, noise: Fields) -> Iterator[str]:
     """An alarm that makes no number worse: sigmas are of the scatter found."""
     if found is not None and found.alarm is Alarm.BELOW_STATED:
         yield (
             f"What remains is only {significant(found.factor)} times the assumed noise: put the noise that "
-            "was found into [noise] of the rig file."
+            f"was found into [noise] of the rig file{_as_keys(noise)}."
         )
+
+
+def _as_keys(noise: Fields) -> str:
+    """The sizes found, as a rig file has them: of keys that hold one number."""
+    keys = {"joint": "joint_rad", **{name: source.key for name, source in SOURCES.items() if source.key == f"{name}_m"}}
+    found = [f"{key} = {noise[name]:.2g}" for name, key in keys.items() if isinstance(noise.get(name), float)]
+    return f": {', '.join(found)}" if found else ""
 
 
 def _noisy_sources(noise: Fields) -> Iterator[ReasonForCare]:
