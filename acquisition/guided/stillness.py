@@ -111,7 +111,7 @@ SILENCE_S = 1.0  # host time without a sample after which a wait gives up: longe
 
 
 class WiredEncoderWatch:
-    """Implements acquisition.guided.stillness.EncoderWatch. `hurry`: device seconds in one second of the host."""
+    """Implements acquisition.guided.stillness.EncoderWatch. `hurry`: device seconds in one second of the stamps."""
 
     def __init__(self, pump: Pump, supervisor: Supervisor, hurry: float = 1.0, channel: str = "position_rad") -> None:
         self._pump, self._supervisor, self._hurry, self._channel = pump, supervisor, hurry, channel

@@ -20,6 +20,7 @@ from acquisition.recording.can_frames import (
     channels,
 )
 from acquisition.recording.can_log import frame_of
+from acquisition.recording.rig.devices import HARDWARE_STAMPS
 from drivers.clock import Clock
 from drivers.device import Stamps
 
@@ -50,11 +51,11 @@ class Streams(Protocol):
         ...
 
 
-def frame_stamps(interface: str) -> Stamps:
-    """What the stamps of frames are, by python-can's name of the interface (python-can 4, "CAN Interface Modules")."""
+def frame_stamps(interface: str, *, asked: bool = False) -> Stamps:
+    """What the stamps of frames are, by python-can's name of the interface; `asked`: the rig file asks for stamps."""
     if interface == "socketcan":  # the kernel's, unless the adapter's own are asked for, which python-can does not
         return "arrived"
-    return "hardware" if interface in ("ixxat", "kvaser", "pcan", "vector") else "unknown"
+    return "hardware" if asked or interface in HARDWARE_STAMPS else "unknown"
 
 
 class FrameLog:

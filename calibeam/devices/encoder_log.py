@@ -71,7 +71,9 @@ class EncoderLog:
         begin = partial(_begin, rig_text=rig_text, clock=clock)
         self._recording = SegmentedRecording(folder, begin, clock, rotation)
         if raw and isinstance(device, EncodersDevice):
-            self._frames = FrameLog(self._recording, clock, frame_stamps(device.interface))
+            self._frames = FrameLog(
+                self._recording, clock, frame_stamps(device.interface, asked=device.stamped_by_adapter)
+            )
         self._stream: SegmentStream | None = None
         self.since_s: float | None = None  # host time from which it runs
         self._rows = self._outages = 0

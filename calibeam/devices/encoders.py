@@ -93,7 +93,12 @@ def encoder_driver(device: EncodersDevice, clock: Clock, tap: Tap | None = None,
     `hurry`: device seconds in one second of this program's clock.
     """
     open_bus = bus_opener(
-        device.interface, device.channel, device.bitrate, device.options, serial_number=device.serial_number
+        device.interface,
+        device.channel,
+        device.bitrate,
+        device.options,
+        serial_number=device.serial_number,
+        stamped=device.stamped_by_adapter,
     )
     if tap is not None:
         open_bus = tapped(open_bus, tap)
@@ -113,8 +118,19 @@ def encoder_driver(device: EncodersDevice, clock: Clock, tap: Tap | None = None,
 
 def _described(open_bus: OpenBus, device: EncodersDevice, clock: Clock, hurry: float) -> Device:
     joints = joint_signals(Path(device.dbc or ""), device.signals, device.units_per_turn)
-    limit_rad_s2 = (device.acceleration_limit_rad_s2 or math.inf) * hurry**2
-    return CanDbcEncoders(open_bus, joints, clock=clock, acceleration_limit_rad_s2=limit_rad_s2)
+    limit_rad_s2 = (device.acceleration_limit_rad_s2 or math.inf) * stamp_pace(device, hurry) ** 2
+    return CanDbcEncoders(
+        open_bus,
+        joints,
+        clock=clock,
+        stamps="hardware" if device.stamped_by_adapter else "arrived",
+        acceleration_limit_rad_s2=limit_rad_s2,
+    )
+
+
+def stamp_pace(device: EncodersDevice, hurry: float) -> float:
+    """Device seconds in one second of the rows' time stamps: the adapter's clock is a device, too."""
+    return 1.0 if device.stamped_by_adapter else hurry
 
 
 def emulated_encoders(device: EncodersDevice, announced: Mapping[str, Any]) -> EncodersDevice:

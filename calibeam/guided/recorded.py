@@ -20,7 +20,7 @@ from acquisition.recording import Channel, Event, RecordingError, RecordingWrite
 from acquisition.recording.rig import Rig
 from acquisition.recording.rig.devices import EncodersDevice
 from acquisition.wires.streams import Pump, Supervisor
-from calibeam.devices.encoders import VIEWED, emulated_encoders, encoder_driver, identities_of
+from calibeam.devices.encoders import VIEWED, emulated_encoders, encoder_driver, identities_of, stamp_pace
 from calibeam.devices.recorder import Interrupted, uninterrupted
 from calibeam.guided.judge import FittedJudge
 from calibeam.outcome import PartialResult, interruption
@@ -96,7 +96,7 @@ def watching(address: EncoderAddress, writer: RecordingWriter, clock: Clock) -> 
         raise
     pump.start()
     try:
-        yield WiredEncoderWatch(pump, supervisor, address.hurry)
+        yield WiredEncoderWatch(pump, supervisor, stamp_pace(address.device, address.hurry))
     finally:
         with uninterrupted():
             pump.stop()

@@ -27,7 +27,7 @@ from acquisition.recording.session_folder import CSV, RIG, read_folder
 from acquisition.wires.streams import Pump, Supervisor
 from calibeam.asking import Asking
 from calibeam.console import Console
-from calibeam.devices.encoders import encoder_driver
+from calibeam.devices.encoders import encoder_driver, stamp_pace
 from calibeam.devices.recorder import Interrupted, uninterrupted
 from calibeam.devices.robot import robot_of
 from calibeam.emulation import EmulationError
@@ -147,7 +147,8 @@ def reading_joints(rig: Rig, clock: Clock, hurry: float = 1.0) -> Generator[tupl
     if robot is not None:
         driver, channel, pace = robot_of(robot, clock, hurry).reader, "actual_q_rad", 1.0
     elif encoders is not None:
-        driver, channel, pace = encoder_driver(encoders, clock, hurry=hurry), "position_rad", hurry
+        driver, channel = encoder_driver(encoders, clock, hurry=hurry), "position_rad"
+        pace = stamp_pace(encoders, hurry)
     else:
         raise AcquisitionError(f"rig {rig.name}: no [devices.robot] or [devices.encoders]; --touch reads one of them")
     supervisor = Supervisor(lambda: None, clock)  # nothing to stop: a person moves the arm

@@ -1,12 +1,14 @@
 """Plain encoders on CAN that send by themselves, described by a DBC file, as an instrument.
 
 Nothing is ever sent: a bus with another master is only listened to. The encoders are not synchronous; how old each
-reading was when the row was complete is a channel. One thread uses it at a time, except `close`.
+reading was when the row was complete is a channel. Times are those of arrival here, or the adapter's own. One thread
+uses it at a time, except `close`.
 """
 
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import can
 import numpy as np
@@ -27,8 +29,9 @@ class _EncoderRow:
     """One reading of each encoder, and the state of things at that time."""
 
     sequence: int
-    done_s: float
-    readings: Mapping[int, tuple[float, float]]  # place -> angle, host time
+    host_s: float  # when it was complete
+    done_s: float  # the same by the clock of the stamps
+    readings: Mapping[int, tuple[float, float]]  # place -> angle, stamp
     slip_rad: tuple[float, ...]
     bus_errors: int
 
@@ -41,8 +44,6 @@ class CanDbcEncoders(StreamDevice[can.BusABC]):
     failure come with the next read.
     """
 
-    stamps: Stamps = "arrived"
-
     def __init__(
         self,
         open_bus: OpenBus,
@@ -50,14 +51,17 @@ class CanDbcEncoders(StreamDevice[can.BusABC]):
         *,
         name: str = "encoders",
         clock: Clock | None = None,
+        stamps: Literal["arrived", "hardware"] = "arrived",
         speed_limit_rad_s: float = SPEED_LIMIT_RAD_S,
         acceleration_limit_rad_s2: float = math.inf,
     ) -> None:
-        """ValueError for no joints."""
+        """`stamps`: "hardware" only where messages of the bus carry the adapter's time. ValueError for no joints."""
         if not joints:
             raise ValueError(f"{name}: no signals; name one per joint")
         super().__init__(name, clock)
         self.joints = tuple(joints)
+        self.stamps: Stamps = stamps
+        self._by_adapter = stamps == "hardware"
         self.bad_frames = 0
         self._open_bus = open_bus
         self._limits = speed_limit_rad_s, acceleration_limit_rad_s2
@@ -67,7 +71,7 @@ class CanDbcEncoders(StreamDevice[can.BusABC]):
         for place, joint in enumerate(self.joints):
             self._places.setdefault(joint.frame, []).append(place)
         self._sequence = 0
-        self._row: dict[int, tuple[float, float]] = {}  # place -> angle, host time
+        self._row: dict[int, tuple[float, float]] = {}  # place -> angle, stamp
         self._heard_s: dict[int, float] = {}
         self._rows: list[_EncoderRow] = []
 
@@ -140,25 +144,26 @@ class CanDbcEncoders(StreamDevice[can.BusABC]):
         if message.is_error_frame:
             self._faults.take(message, now_s)
             return
+        stamp_s = message.timestamp if self._by_adapter else now_s
         places = self._places.get((message.arbitration_id, message.is_extended_id), [])
         if any(place in self._row for place in places):
-            self._finish(now_s)
+            self._finish(now_s, stamp_s)
         data = bytes(message.data)
         for place in places:
             counts = self.joints[place].counts(data)
             if counts is None:
                 self.bad_frames += 1
                 continue
-            angle_rad = self._angles[place].follow(counts, now_s) + self.joints[place].offset_rad
-            self._row[place] = angle_rad, now_s
+            angle_rad = self._angles[place].follow(counts, stamp_s) + self.joints[place].offset_rad
+            self._row[place] = angle_rad, stamp_s
             self._heard_s[place] = now_s
         if len(self._row) == len(self.joints):
-            self._finish(now_s)
+            self._finish(now_s, stamp_s)
 
-    def _finish(self, now_s: float) -> None:
+    def _finish(self, now_s: float, stamp_s: float) -> None:
         readings, self._row = self._row, {}
         slips_rad = tuple(angle.slip_rad for angle in self._angles)
-        self._rows.append(_EncoderRow(self._sequence, now_s, readings, slips_rad, self._faults.count))
+        self._rows.append(_EncoderRow(self._sequence, now_s, stamp_s, readings, slips_rad, self._faults.count))
         self._sequence += 1
 
     def _check_silence(self) -> None:
@@ -174,14 +179,14 @@ class CanDbcEncoders(StreamDevice[can.BusABC]):
     def _block(self, rows: Sequence[_EncoderRow]) -> Block:
         nothing = (math.nan, math.nan)
         each = np.array([[row.readings.get(place, nothing) for place in range(len(self.joints))] for row in rows])
-        host_s = np.array([row.done_s for row in rows])
+        done_s = np.array([row.done_s for row in rows])
         return Block(
-            host_s=host_s,
+            host_s=np.array([row.host_s for row in rows]),
             device_s=np.nanmean(each[:, :, 1], axis=1),
             sequence=np.array([row.sequence for row in rows], dtype=np.int64),
             values={
                 "position_rad": each[:, :, 0],
-                "age_s": host_s[:, None] - each[:, :, 1],
+                "age_s": done_s[:, None] - each[:, :, 1],
                 "slip_rad": np.array([row.slip_rad for row in rows], dtype=np.float64),
                 "bus_errors": np.array([row.bus_errors for row in rows], dtype=np.uint32),
             },

@@ -21,6 +21,7 @@ from serial.tools import list_ports
 from drivers.errors import DeviceError, DeviceLost
 from drivers.transports.serial_port import find_port
 from drivers.transports.slcan_bus import BlockSlcanBus
+from drivers.transports.slcan_stamps import MinuteClock, StampedSlcanBus
 
 SLCAN_SETTLE_S = 0.05  # python-can waits 2 s by default, for boards that reset when opened; ours need not
 MOST_AT_ONCE = 64  # ten rows of six encoders: a bus that is flooded does not keep the SYNC waiting
@@ -34,19 +35,24 @@ def bus_opener(
     options: Mapping[str, Any] | None = None,
     *,
     serial_number: str | None = None,
+    stamped: bool = False,
     ports: Callable[[], Iterable[Any]] = list_ports.comports,
 ) -> OpenBus:
     """How to open a bus of any python-can interface, from these arguments only: no configuration file is read.
 
     `options` are further words of python-can for that interface. With a `serial_number` the port of a serial adapter is
-    looked up by its USB plug at every opening, so that an adapter that comes back elsewhere is found.
+    looked up by its USB plug at every opening, so that an adapter that comes back elsewhere is found. `stamped`: an
+    adapter of interface slcan is asked for its time stamps.
     """
     settings: dict[str, Any] = {"sleep_after_open": SLCAN_SETTLE_S} if interface == "slcan" else {}
     settings |= options or {}
+    minutes = MinuteClock()
 
     def open_bus() -> can.BusABC:
         _check_interface(interface)
         where = channel if serial_number is None else find_port(serial_number, ports)
+        if interface == "slcan" and stamped:
+            return StampedSlcanBus(where, minutes, bitrate=bitrate, **settings)
         if interface == "slcan":
             return BlockSlcanBus(where, bitrate=bitrate, **settings)
         return can.Bus(where, interface=interface, bitrate=bitrate, ignore_config=True, **settings)

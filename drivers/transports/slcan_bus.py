@@ -22,7 +22,7 @@ from can.interfaces.slcan import slcanBus
 _ACKNOWLEDGED = ("", "z", "Z")  # LAWICEL CANUSB manual, version 1.0D: command done, frame taken
 _HEAD = re.compile(r"t([0-9A-Fa-f]{3})([0-8])")
 READ_BYTES = 4096  # what a port holds back
-NO_STAMP = 0.0  # such adapters send none; python-can puts the time of this program there, which is no adapter's
+NO_STAMP = 0.0  # none was asked for (slcan_stamps does); python-can puts the time of this program there
 LONGEST_LINE = 256  # a frame of CAN FD takes 139; a line without an end is junk, and may not fill the memory
 
 
@@ -52,7 +52,7 @@ class BlockSlcanBus(slcanBus):
             self._fill(timeout)
         if not self._lines:
             return None
-        message = None if self._filters else _classic(self._lines[0])
+        message = None if self._filters else classic_frame(self._lines[0])
         if message is not None:
             self._lines.popleft()
             return message
@@ -66,7 +66,7 @@ class BlockSlcanBus(slcanBus):
         if not self._lines:
             self._fill(timeout)
         messages: list[can.Message] = []
-        while self._lines and not self._filters and (message := _classic(self._lines[0])) is not None:
+        while self._lines and not self._filters and (message := classic_frame(self._lines[0])) is not None:
             self._lines.popleft()
             messages.append(message)
         if not messages and self._lines and (rare := self.recv(0.0)) is not None:
@@ -165,7 +165,7 @@ def _read(descriptor: int) -> bytes | None:
         return None
 
 
-def _classic(line: str) -> can.Message | None:
+def classic_frame(line: str) -> can.Message | None:
     """A data frame with an identifier of 11 bits, "tIIILDD..", which nearly all are; None for all else."""
     head = _head(line[:5])
     if head is None or len(line) != 5 + 2 * head[1] or line[5:].strip(hexdigits):

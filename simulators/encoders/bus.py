@@ -7,12 +7,15 @@ another bit rate than the nodes hears and reaches nobody.
 The adapter has ASCII commands on one side, the bus on the other:
 
     C close   S0..S8 bit rate   O open   L listen only   tIIILDD.. TIIIIIIIILDD.. rIIIL RIIIIIIIIL send   V N F ask
+    Z0 Z1 time stamps off, on
 
 Each ends with CR; answered by CR (done) or BEL (refused), a sent frame by z CR or Z CR. Source: LAWICEL CANUSB manual,
-version 1.0D, section "The CANUSB ASCII commands". Does not imitate: time stamps (Z), acceptance filters (M, m), bit
-timing registers (s), polling (A, P, X), the CAN FD commands of later firmware: all answered by BEL.
+version 1.0D, section "The CANUSB ASCII commands". Stamps are the milliseconds of the world's clock, 0 to 59999, as four
+digits behind a frame. Does not imitate: a setting of Z that outlasts the power, acceptance filters (M, m), bit timing
+registers (s), polling (A, P, X), the CAN FD commands of later firmware: all answered by BEL.
 """
 
+import math
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -129,6 +132,7 @@ class CanBus:
 
 
 CR, BEL = b"\r", b"\a"
+TURN_MS = 60_000  # after which stamps begin again
 BITRATES = (10_000, 20_000, 50_000, 100_000, 125_000, 250_000, 500_000, 800_000, 1_000_000)  # S0 to S8
 LONGEST_LINE = 32  # T, 8 digits of identifier, length, 16 digits of data: 26
 VERSION, SERIAL = b"V1013", b"NCB01"
@@ -153,6 +157,7 @@ class SlcanAdapter:
         self._bitrate: int | None = None
         self._open = False
         self._listen_only = False
+        self._stamps = False
 
     def handle(self, data: bytes) -> bytes:
         answer = bytearray()
@@ -169,9 +174,9 @@ class SlcanAdapter:
         out = bytearray()
         now_s = self._world.time_s
         while self._bus.heard and self._bus.heard[0][0] <= now_s:
-            frame = self._bus.heard.popleft()[1]
+            end_s, frame = self._bus.heard.popleft()
             if self._hears:
-                out += as_line(frame)
+                out += as_line(frame, end_s if self._stamps else None)
         return bytes(out)
 
     def damaged(self, output: bytes) -> bytes:
@@ -200,6 +205,9 @@ class SlcanAdapter:
                 return self._open_channel(listen_only=text == "L")
             case "C" if text == "C":
                 return self._close()
+            case "Z" if text in ("Z0", "Z1") and not self._open:
+                self._stamps = text == "Z1"
+                return CR
             case "t" | "T" | "r" | "R":
                 return self._send(text)
             case "V" | "N" | "F" if len(text) == 1:
@@ -240,11 +248,12 @@ class SlcanAdapter:
         return (VERSION if text == "V" else SERIAL) + CR
 
 
-def as_line(frame: CanFrame) -> bytes:
-    """The line by which the client learns of a frame."""
+def as_line(frame: CanFrame, end_s: float | None = None) -> bytes:
+    """The line by which the client learns of a frame; with the time of its end in the minute where it is given."""
     letter = "r" if frame.remote else "t"
     number = f"{letter.upper()}{frame.id:08X}" if frame.extended else f"{letter}{frame.id:03X}"
-    return f"{number}{frame.dlc:X}{frame.data.hex().upper()}\r".encode("ascii")
+    stamp = "" if end_s is None else f"{math.floor(1e3 * end_s) % TURN_MS:04X}"
+    return f"{number}{frame.dlc:X}{frame.data.hex().upper()}{stamp}\r".encode("ascii")
 
 
 def from_line(text: str) -> CanFrame | None:

@@ -48,6 +48,26 @@ def test_they_are_checked_and_logged(site: Path, capsys: pytest.CaptureFixture[s
     assert 0.0 < spread.max() < 0.1
 
 
+def test_rows_and_frames_have_the_time_of_the_adapter_that_stamps_them(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    signals = 'signals = ["ENCODER1.Angle", "ENCODER2.Angle", "ENCODER3.Angle"]'
+    plain = f'driver = "can-dbc"\nstamp = "hardware"\ndbc = "{RIG.parent / "encoders-plain.dbc"}"\n{signals}'
+    text = RIG.read_text().replace('driver = "cia406"', plain).replace("nodes = [1, 2, 3]", "")
+    (tmp_path / "rig.toml").write_text(text)
+    with Emulation(tmp_path / "rig.toml", seed=3, time_scale=2.0, truth=tmp_path / "truth.json") as running:
+        (tmp_path / "rig.toml").write_text(text.replace("out/emulated/can", running.address["can"]["channel"]))
+        arguments = ["log", "encoders", str(tmp_path / "rig.toml"), "--out", str(tmp_path / "log"), "--for-s", "1"]
+        assert run(arguments) == 0
+    assert run(["check", str(tmp_path / "log")]) == 0
+    assert capsys.readouterr().out.count("time stamp: hardware") == 2
+    streams = read(log_of(tmp_path)).streams
+    assert {name: stream.stamps for name, stream in streams.items()} == {"can": "hardware", "encoders": "hardware"}
+    device_s, sequence = streams["encoders"].device_s, streams["encoders"].sequence
+    np.testing.assert_allclose(device_s - device_s[0], 0.01 * (sequence - sequence[0]), atol=0.0021)
+    assert np.isfinite(streams["can"].device_s).all()
+
+
 @pytest.mark.parametrize(("name", "reader"), [("bus.blf", can.BLFReader), ("bus.log", can.CanutilsLogReader)])
 def test_frames_go_out_and_come_back(site: Path, tmp_path: Path, name: str, reader: type) -> None:
     assert run(["export", str(log_of(site)), "--out", str(tmp_path / name)]) == 0

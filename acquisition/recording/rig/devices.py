@@ -30,6 +30,8 @@ RegisterAddress = Annotated[int, Meta(ge=0, le=65535)]  # Modbus Application Pro
 RegisterCount = Annotated[int, Meta(ge=1, le=65536)]
 NodeId = Annotated[int, Meta(ge=1, le=127)]  # CiA 301, 7.2
 MaybePath = Annotated[str, Meta(max_length=1000)]  # as FilePath; empty: none
+HARDWARE_STAMPS = ("ixxat", "kvaser", "pcan", "vector")  # python-can 4, "CAN Interface Modules": the adapter's own time
+STAMPS_WHEN_ASKED = "slcan"  # by `Z1`
 
 
 class PsdDriver(enum.Enum):
@@ -51,6 +53,13 @@ class EncoderDriver(enum.Enum):
 
     CIA406 = "cia406"
     CAN_DBC = "can-dbc"
+
+
+class RowStamp(enum.Enum):
+    """Whose time a row of encoders has: of its arrival at this computer, or of the CAN adapter."""
+
+    ARRIVED = "arrived"
+    HARDWARE = "hardware"
 
 
 class RobotDriver(enum.Enum):
@@ -112,6 +121,12 @@ class EncodersDevice(Struct, frozen=True, forbid_unknown_fields=True):
     signals: PerJoint[Name] = ()  # "Message.Signal" of the DBC file
     units_per_turn: PositiveFactor | None = None  # for signals whose unit is no angle, and CiA 406 logs without set-up
     acceleration_limit_rad_s2: Acceleration | None = None  # beyond it a step is a slip, not motion
+    stamp: RowStamp | None = None  # only of can-dbc; None: arrived
+
+    @property
+    def stamped_by_adapter(self) -> bool:
+        """Whether rows have the adapter's time, and not this computer's."""
+        return self.stamp is RowStamp.HARDWARE
 
     @property
     def named(self) -> tuple[int, ...] | tuple[str, ...]:

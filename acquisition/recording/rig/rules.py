@@ -11,6 +11,8 @@ from collections.abc import Iterator
 from acquisition.recording.files.bounds import ARM_M
 from acquisition.recording.files.explain import KeyPath, in_metres, section
 from acquisition.recording.rig.devices import (
+    HARDWARE_STAMPS,
+    STAMPS_WHEN_ASKED,
     EncoderDriver,
     EncodersDevice,
     PsdDevice,
@@ -331,6 +333,7 @@ def _bus_faults(encoders: EncodersDevice) -> Iterator[Fault]:
 def _encoder_faults(encoders: EncodersDevice, n_joints: int) -> Iterator[Fault]:
     plain = encoders.driver is EncoderDriver.CAN_DBC
     yield from _strangers(ENCODERS, encoders, CIA406_ONLY if plain else DBC_ONLY, encoders.driver.value)
+    yield from _stamp_faults(encoders)
     if plain and encoders.dbc is None:
         yield ENCODERS, "[devices.encoders] of driver \"can-dbc\" needs 'dbc', the file that describes the encoders"
     units = encoders.units_per_turn
@@ -348,6 +351,21 @@ def _encoder_faults(encoders: EncodersDevice, n_joints: int) -> Iterator[Fault]:
         )
     if len(set(named)) != len(named):
         yield (*ENCODERS, key), f"{key} = {list(named)} names one twice; every joint has its own"
+
+
+def _stamp_faults(encoders: EncodersDevice) -> Iterator[Fault]:
+    if encoders.stamp is None:
+        return
+    path, text = (*ENCODERS, "stamp"), f'stamp = "{encoders.stamp.value}"'
+    stamped = (*HARDWARE_STAMPS, STAMPS_WHEN_ASKED)
+    if encoders.driver is EncoderDriver.CIA406:
+        yield path, f'{text} belongs to driver "can-dbc"; rows of "cia406" are stamped by the SYNC sent: delete it'
+    elif encoders.stamped_by_adapter and encoders.interface not in stamped:
+        yield (
+            path,
+            f'{text}: interface "{encoders.interface}" gives no stamps of the adapter; delete the key, or use an '
+            f"adapter of {', '.join(sorted(stamped))}",
+        )
 
 
 def _strangers(

@@ -17,6 +17,7 @@ PLAIN = re.sub(
     PAIR,
     flags=re.DOTALL,
 )
+SOCKET = PLAIN.replace('interface = "slcan"', 'interface = "socketcan"')
 
 
 def loaded(tmp_path, text: str):
@@ -72,6 +73,14 @@ def test_an_adapter_by_serial_number_and_further_words(tmp_path):
             "either 'channel'|belongs to interface",
         ),
         (PLAIN, 'dbc = "rigs/encoders-plain.dbc"\n', "", "needs 'dbc', the file"),
+        (SOCKET, "dbc =", 'stamp = "hardware"\ndbc =', 'stamp = "hardware": interface "socketcan" gives no stamps of'),
+        (PLAIN, "dbc =", 'stamp = "sampled"\ndbc =', "unknown value 'sampled'; known are arrived, hardware"),
+        (
+            PAIR,
+            "nodes =",
+            'stamp = "arrived"\nnodes =',
+            'stamp = "arrived" belongs to driver "can-dbc"; rows of "cia406"',
+        ),
         (PLAIN, '"F.A"', '"A.A"', "names one twice"),
         (PLAIN, ', "F.A"', "", "names 5 encoders, the arm has 6 joints"),
     ],

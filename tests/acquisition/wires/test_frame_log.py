@@ -132,15 +132,21 @@ def test_two_threads_lose_and_double_nothing(recorded) -> None:
 
 
 @pytest.mark.parametrize(
-    ("interface", "stamps"),
-    [("socketcan", "arrived"), ("vector", "hardware"), ("pcan", "hardware"), ("slcan", "unknown")],
+    ("interface", "asked", "stamps"),
+    [
+        ("socketcan", False, "arrived"),
+        ("vector", False, "hardware"),
+        ("pcan", False, "hardware"),
+        ("slcan", False, "unknown"),
+        ("slcan", True, "hardware"),
+    ],
 )
-def test_frames_have_the_stamps_of_their_interface(interface: str, stamps: str) -> None:
+def test_frames_have_the_stamps_of_their_interface(interface: str, asked: bool, stamps: str) -> None:
     declared: list[str] = []
 
     class Declaring:
         def stream(self, name, channels, viewer=None, *, stamps="unknown"):
             declared.append(stamps)
 
-    FrameLog(Declaring(), Clock(), frame_stamps(interface))
+    FrameLog(Declaring(), Clock(), frame_stamps(interface, asked=asked))
     assert declared == [stamps]

@@ -16,6 +16,7 @@ from drivers.errors import DeviceLost, DeviceRefused, DeviceStale
 from drivers.transports.can_bus import bus_opener
 from simulators.encoders.emulator import build
 from simulators.host.loop import Host
+from tests.drivers.transports.stamping_adapter import SPEED_RAD_S, START_RAD, StampingAdapter
 
 ROOT = Path(__file__).parents[3]
 PLAIN = ROOT / "rigs/encoders-plain.dbc"
@@ -112,6 +113,36 @@ def test_an_encoder_that_is_silent_is_named(served):
 def test_a_missing_bus_is_lost():
     with pytest.raises(DeviceLost, match="cannot be opened"):
         CanDbcEncoders(bus_opener("slcan", "no-such-port", 1_000_000), joint_signals(PLAIN, SIGNALS, None)).connect()
+
+
+def test_rows_have_the_time_of_the_adapter_also_when_they_come_in_a_burst_over_its_minute():
+    adapter = StampingAdapter(time_s=59.93)
+
+    def open_bus() -> can.BusABC:
+        adapter.run(0.02)  # nothing is heard while it is closed
+        bus = adapter.open()
+        adapter.run(0.1)  # ten rows, before the first is read
+        return bus
+
+    encoders = CanDbcEncoders(open_bus, joint_signals(PLAIN, SIGNALS, None), stamps="hardware")
+    encoders.connect()
+    try:
+        blocks = [encoders.read(0.02)]
+        adapter.run(0.1)
+        blocks.append(encoders.read(0.02))
+    finally:
+        encoders.close()
+        adapter.close()
+    device_s = np.concatenate([block.device_s for block in blocks])
+    turned_rad = np.concatenate([block.values["position_rad"] for block in blocks]) - START_RAD
+    assert len(device_s) > 15
+    np.testing.assert_allclose(np.diff(device_s), 0.01, atol=0.0011)
+    for block in blocks:
+        assert np.ptp(block.host_s) < 0.5 * np.ptp(block.device_s)
+        assert block.values["age_s"].max() < 0.003  # six frames of 0.12 ms, stamps of 1 ms
+    read_s = turned_rad.mean(axis=1) / SPEED_RAD_S  # when the shafts stood there
+    assert np.ptp(device_s - read_s) < 0.0021
+    assert encoders.stamps == "hardware"
 
 
 # --- in memory

@@ -90,6 +90,14 @@ def test_frames_carry_no_stamp_for_the_adapter_gives_none(adapter: Adapter) -> N
     assert all(message is not None and math.isnan(frame_of(message, 7.0, sent=False).device_s) for message in messages)
 
 
+def test_frames_of_an_adapter_that_still_stamps_are_read_without_the_stamp(adapter: Adapter) -> None:
+    adapter.says(b"t28140A0B0C0D0102\rT1ABCDEF82FF000103\rt08000104\r")
+    messages = [message for _ in range(3) if (message := adapter.bus.recv(2.0)) is not None]
+    frames = [FRAMES[0], FRAMES[2], FRAMES[1]]
+    assert [(m.arbitration_id, m.is_extended_id, bytes(m.data)) for m in messages] == frames
+    assert all(math.isnan(frame_of(message, 7.0, sent=False).device_s) for message in messages)
+
+
 @pytest.mark.parametrize("at", range(1, len(LINES), 5))
 def test_a_line_may_come_in_two_pieces(adapter: Adapter, at: int) -> None:
     adapter.says(LINES[:at])

@@ -52,7 +52,8 @@ def test_the_documented_dialogue(adapter):
         (["S8", "L", "t0800"], b"\r\r\a"),  # listening only
         (["S8", "O", "t0800", "T000000800", "r0810", "R000000810"], b"\r\rz\rZ\rz\rZ\r"),
         (["S8", "O", "t080", "t08010", "t8000", "t0809", "tXYZ0", "T800000000"], b"\r\r" + b"\a" * 6),
-        (["d0800", "Z1", "Oo", "\x00\xff", "x" * 500], b"\a" * 5),
+        (["Z1", "Z0", "S8", "O", "Z1"], b"\r\r\r\r\a"),  # open
+        (["d0800", "Z2", "Oo", "\x00\xff", "x" * 500], b"\a" * 5),
     ],
 )
 def test_commands_and_answers(adapter, commands, answers):
@@ -73,6 +74,14 @@ def test_nothing_is_heard_while_closed_or_at_another_bit_rate(adapter):
     assert len(adapter.run(0.02)) == 6
     adapter.send("t0800", "C")
     assert adapter.run(0.02) == []
+
+
+def test_stamps_are_the_milliseconds_of_the_minute_in_which_a_frame_ended(adapter):
+    adapter.world.time_s = 59.996
+    adapter.send("S8", "Z1", "O")
+    assert adapter.run(0.004) == [f"t70{node}100EA5E" for node in range(1, 7)]
+    adapter.send("C", "Z0", "O", "t00020100", "t0800")
+    assert {len(line) - 2 * int(line[4]) for line in adapter.run(0.01)} == {5}
 
 
 def test_boot_up_messages_of_all_nodes_at_power_on(adapter):
