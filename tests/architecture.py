@@ -202,8 +202,8 @@ def figures() -> tuple[Figure, ...]:
 
 
 TODAY = {
-    "files": 786,
-    "code": 84_400,
+    "files": 788,
+    "code": 84_720,
     "longest_function": 53,
     "one_importer": 2,
     "classes": 0,
