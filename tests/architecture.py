@@ -202,8 +202,8 @@ def figures() -> tuple[Figure, ...]:
 
 
 TODAY = {
-    "files": 787,
-    "code": 84_543,
+    "files": 805,
+    "code": 86_500,
     "longest_function": 53,
     "one_importer": 2,
     "classes": 0,

@@ -22,10 +22,16 @@ USUAL: Mapping[str, Any] = {
     "at_s": 0.0,
     "until_s": 1e9,
     "centre_m": (0.0, 0.0),
+    "lean_y_rad": 0.0,
 }  # of what a line leaves out
 HALF_FACE_M = 5e-3
 UNITS = (
+    ("_nms_rad", "Nm/(rad/s)"),
+    ("_nm_rad", "Nm/rad"),
     ("_rad_nm", "rad/Nm"),
+    ("_rad_s", "rad/s"),
+    ("_kg_m2", "kg m²"),
+    ("_kg", "kg"),
     ("_rad_nm3", "rad/Nm³"),
     ("_per_nm2", "1/(Nm²)"),
     ("_per_k", "1/K"),

@@ -1,7 +1,7 @@
 """What can be physically wrong with an arm and its instruments, as mechanisms that are exact and know nothing of a fit.
 
-A file holds the mechanisms of one place in the chain: encoder, drive, link, base, tool, fixture, detector, tracker, and
-`outside` for what no catalogue lists. A new mechanism is one class there, with the method of its place (`defect.py`
+A file holds the mechanisms of one place: encoder, drive, torque, link, base, tool, fixture, detector, tracker,
+and `outside` for what no catalogue lists. A new mechanism is one class there, with the method of its place (`defect.py`
 lists the places), and one line in `mechanisms.MECHANISMS`, or in `mechanisms.GIVEN` where it has its numbers from a
 model only.
 """

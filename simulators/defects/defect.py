@@ -118,6 +118,32 @@ class UnderWeights(Defect):
         return own[0] + payload[0], own[1] + payload[1]
 
 
+# --- an arm in motion
+
+
+@dataclass(frozen=True, eq=False)
+class Shafts:
+    """The joints at a moment, each (n,)."""
+
+    q_rad: Floats  # as the controller reads them
+    qd_rad_s: Floats
+    torque_nm: Floats  # of the drives
+
+
+@dataclass(frozen=True, eq=False)
+class Masses:
+    """What the rig states beside its links."""
+
+    rotor_kg_m2: Floats  # (n,) at the joint
+    tool_kg: float
+    tool_com_m: Vector  # in the flange frame
+    gravity_m_s2: Vector  # in the base frame
+
+    @property
+    def n_joints(self) -> int:
+        return len(self.rotor_kg_m2)
+
+
 # --- drawing
 
 
@@ -161,6 +187,42 @@ class TurnsJoint(Protocol):
 
     def extra_turn_rad(self, shaft_rad: Floats, scene: Scene, load: Load) -> Floats:
         """Output less shaft, (row, n)."""
+        ...
+
+
+@runtime_checkable
+class RubsAtJoint(Protocol):
+    """Against the motion of a joint."""
+
+    def joint_friction_nm(self, shafts: Shafts) -> Floats:
+        """(n,) that the drives give more, never against the sign of the speed."""
+        ...
+
+
+@runtime_checkable
+class PullsAtJoint(Protocol):
+    """Between housing and output of a joint."""
+
+    def joint_pull_nm(self, shafts: Shafts) -> Floats:
+        """(n,) that the drives give more."""
+        ...
+
+
+@runtime_checkable
+class ChangesMasses(Protocol):
+    """What is accelerated and weighs."""
+
+    def true_masses(self, stated: Masses) -> Masses:
+        """The true ones."""
+        ...
+
+
+@runtime_checkable
+class ReportsTorque(Protocol):
+    """Between the torque of a drive and what its controller reports."""
+
+    def reported_torque_nm(self, given_nm: Floats, step_s: float) -> Floats:
+        """(step, n) of the torques given, the newest last, `step_s` apart."""
         ...
 
 

@@ -13,7 +13,19 @@ from typing import Any, cast
 
 import msgspec
 
-from simulators.defects import base, detector, drive, encoder, fixture, found_curve, link, outside, tool, tracker
+from simulators.defects import (
+    base,
+    detector,
+    drive,
+    encoder,
+    fixture,
+    found_curve,
+    link,
+    outside,
+    tool,
+    torque,
+    tracker,
+)
 from simulators.defects.defect import Defect
 
 MECHANISMS: tuple[type[Defect], ...] = (
@@ -105,6 +117,18 @@ GIVEN: tuple[type[Defect], ...] = (
     found_curve.CurveAtLink,
     found_curve.CurveAtBase,
     found_curve.CurveInReading,
+    torque.Coulomb,
+    torque.Viscous,
+    torque.Stribeck,
+    torque.LoadFriction,
+    torque.JointSpring,
+    torque.GearRipple,
+    torque.HeavyRotor,
+    torque.UnstatedPayload,
+    torque.LeaningGravity,
+    torque.WrongTorqueConstant,
+    torque.TorqueOffset,
+    torque.LateTorque,
 )
 
 

@@ -24,12 +24,14 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from simulators.defects.defect import Shafts
 from simulators.wire import TICK_S
 from simulators.world.model import STEP_S, build_mjcf, torque_limits_nm
 from simulators.world.moving_mechanisms import Exposure, MovingMechanisms
 from simulators.world.optics import Ray
 from simulators.world.rig import WorldRig
-from simulators.world.servo import Engine, Servo
+from simulators.world.servo import STIFFNESS, Engine, Servo
+from simulators.world.torque_mechanisms import TorqueMechanisms
 from simulators.world.truth import Truth
 
 Floats = NDArray[np.float64]
@@ -130,21 +132,29 @@ class ArmBody:
         rng: np.random.Generator,
         hidden: MovingMechanisms | None = None,
         rest_degC: Mapping[str, float] | None = None,
+        torques: TorqueMechanisms | None = None,
+        stated: WorldRig | None = None,
     ) -> None:
+        """`stated`: the rig as its controller has it, where `rig` has other masses."""
         n = len(truth.links)
         self._hidden, self._exposure = hidden, Exposure(q_rad, rest_degC)
+        self._torques = torques
         self._engine = Engine(build_mjcf(rig, truth))
+        self._stated = self._engine if stated is None else Engine(build_mjcf(stated, truth))
         self._at, self._driven = self._engine.joint_addresses([f"joint{number}" for number in range(1, n + 1)])
         self._laser_origin, self._laser_axes = self._engine.site("laser")
         self._turning = [self._engine.body(f"axis{number}") for number in range(1, n + 1)]
         self._zero_rad: Floats = np.array(truth.joint_zero_rad)
         self._reference = Reference(q_rad)
         self._repeatability = Repeatability(rig.emulation.joint_repeatability_rad, n, rng)
-        self._servo = Servo(self._engine, self._driven, np.array(torque_limits_nm(rig.arm, rig.tool)))
+        limits = stated or rig
+        self._servo = Servo(self._engine, self._driven, np.array(torque_limits_nm(limits.arm, limits.tool)))
         self._engine.qpos[self._at] = q_rad + self._offset_rad()
         self._engine.refresh()
         self._servo.drive(np.zeros(n), np.zeros(n))
-        self.stands = True
+        if torques is not None:
+            torques.given(self._servo.torque_nm)
+        self.stands = torques is None or not torques.acting
 
     def aim(self, q_rad: Floats, time_s: float) -> None:
         """A new set-point, in the controller's own readings."""
@@ -162,6 +172,8 @@ class ArmBody:
         error_rad = self._reference.q_rad + self._offset_rad() - self.true_rad()
         error_rad_s = self._reference.qd_rad_s - self.speed_rad_s()
         self._servo.drive(error_rad, error_rad_s)
+        if self._torques is not None:
+            self._load_joints(self._torques)
         self._engine.step()
         if self._reference.arrived and self._repeatability.seated:
             self.stands = self._at_rest(error_rad)
@@ -178,8 +190,22 @@ class ArmBody:
         if np.abs(self._hidden.turn_rad - before_rad).max() > WAKES_RAD:
             self.stands = False
 
+    def _load_joints(self, torques: TorqueMechanisms) -> None:
+        """Takes what the drives have to give beside the links from what moves them."""
+        torques.given(self._servo.torque_nm)
+        if torques.acting:
+            shafts = Shafts(self.reading_rad(), self.speed_rad_s(), self._servo.torque_nm)
+            friction_nm, pull_nm = torques.felt_nm(shafts)
+            self._engine.applied[self._driven] -= pull_nm
+            self._engine.rub(self._driven, friction_nm)
+
     def _at_rest(self, error_rad: Floats) -> bool:
-        """Every joint of the model, driven or not, has come to rest."""
+        """Every joint of the model, driven or not, has come to rest; one that a spring pulls keeps its error."""
+        if self._torques is not None:
+            if not self._torques.settled:
+                return False
+            if self._torques.acting:
+                error_rad = self._engine.qacc / STIFFNESS
         return bool(np.abs(error_rad).max() < STANDS_RAD and np.abs(self._engine.qvel).max() < STANDS_RAD_S)
 
     def true_rad(self) -> Floats:
@@ -194,18 +220,19 @@ class ArmBody:
         return self._engine.qvel[self._driven]
 
     def torque_nm(self) -> Floats:
-        return self._servo.torque_nm
+        """As the drives report them."""
+        return self._servo.torque_nm if self._torques is None else self._torques.reported_nm()
 
     def mass_matrix_kg_m2(self, q_rad: Floats) -> Floats:
         """(n, n) of the links and the tool at the readings `q_rad` (n,), without the rotors."""
-        full = self._engine.inertia_at(self._position_at(q_rad))
+        full = self._stated.inertia_at(self._position_at(q_rad))
         return full[np.ix_(self._driven, self._driven)]
 
     def load_nm(self, q_rad: Floats, qd_rad_s: Floats) -> Floats:
         """(n,) torques of gravity, Coriolis and centrifugal forces at readings and speeds (n,)."""
         qvel = np.zeros(self._engine.n_freedoms)
         qvel[self._driven] = qd_rad_s
-        return self._engine.bias_at(self._position_at(q_rad), qvel)[self._driven]
+        return self._stated.bias_at(self._position_at(q_rad), qvel)[self._driven]
 
     def _position_at(self, q_rad: Floats) -> Floats:
         qpos = self._engine.qpos.copy()

@@ -4,7 +4,7 @@ Each axis is a body `axis<i>` with a hinge `joint<i>`; inside it stands the body
 Denavit-Hartenberg frame after the link and carries its mass. A soft joint or a soft pedestal is one more joint in a
 `link<i>` or `axis1` body: only hinges named `joint<i>` are driven, gravity loads all of them.
 
-What it does not imitate: contact (the arm passes through the fixture), friction, and the flexibility of links.
+What it does not imitate: contact (the arm passes through the fixture) and the flexibility of links.
 """
 
 import math
@@ -16,7 +16,6 @@ from simulators.world.rig import ArmOfRig, Joint, Pose, Tool, Vector, WorldRig
 from simulators.world.truth import TrueLink, Truth, arm_of
 
 STEP_S = 0.001  # physics step; an e-Series joint controller closes its position loop at about this rate
-ARMATURE_KG_M2 = 0.1  # rotor behind the gear; MuJoCo Menagerie, universal_robots_ur5e/ur5e.xml
 NO_MASS_KG = 1e-4  # stands for a mass that the rig does not give: nothing beside the armature, but MuJoCo wants some
 CASTING_KG_M3 = 1350.0  # aluminium (2700) about half hollow: the size of a link follows from its mass
 TORQUE_FLOOR_NM = 28.0  # UR5e wrist joints; Universal Robots, "Max. joint torques", article 17260
@@ -51,7 +50,7 @@ def _add_parts(parent: ElementTree.Element, rig: WorldRig, truth: Truth) -> None
     for number, (joint, part) in enumerate(zip(rig.arm.joint, truth.parts[:-1], strict=True), start=1):
         parent = _add_frame(parent, f"axis{number}", part)
         ElementTree.SubElement(
-            parent, "joint", name=f"joint{number}", type="hinge", axis="0 0 1", armature=repr(ARMATURE_KG_M2)
+            parent, "joint", name=f"joint{number}", type="hinge", axis="0 0 1", armature=repr(joint.rotor_inertia_kg_m2)
         )
         x, y, z = com_m[number - 1].tolist()
         _add_inertia(parent, joint.mass_kg, (x, y, z), reach_m=math.hypot(joint.a_m, joint.d_m))
@@ -62,7 +61,7 @@ def _add_link(parent: ElementTree.Element, number: int, joint: Joint, link: True
     """Rz(theta_offset + q), then Tz(d) Tx(a) Rx(alpha) Ry(beta): "xyz" Euler angles turn about axes carried along."""
     axis = ElementTree.SubElement(parent, "body", name=f"axis{number}", euler=_numbers(0.0, 0.0, link.theta_offset_rad))
     ElementTree.SubElement(
-        axis, "joint", name=f"joint{number}", type="hinge", axis="0 0 1", armature=repr(ARMATURE_KG_M2)
+        axis, "joint", name=f"joint{number}", type="hinge", axis="0 0 1", armature=repr(joint.rotor_inertia_kg_m2)
     )
     frame = ElementTree.SubElement(
         axis,

@@ -15,6 +15,7 @@ Vector = tuple[float, float, float]
 Sigma = Annotated[float, msgspec.Meta(ge=0.0)]
 Positive = Annotated[float, msgspec.Meta(gt=0.0)]
 ZERO: Vector = (0.0, 0.0, 0.0)
+ARMATURE_KG_M2 = 0.1  # rotor behind the gear; MuJoCo Menagerie, universal_robots_ur5e/ur5e.xml
 
 
 class Pose(msgspec.Struct, frozen=True):
@@ -36,6 +37,7 @@ class Joint(msgspec.Struct, frozen=True):
     com_m: Vector = ZERO
     sign: int = 1
     follows: Mapping[str, float] | None = None
+    rotor_inertia_kg_m2: Positive = ARMATURE_KG_M2
 
 
 class ArmOfRig(msgspec.Struct, frozen=True):

@@ -36,7 +36,9 @@ class Engine:
         self.qpos: Floats = self._data.qpos
         self.qvel: Floats = self._data.qvel
         self.bias: Floats = self._data.qfrc_bias  # gravity, Coriolis and centrifugal forces
+        self.qacc: Floats = self._data.qacc  # of the last step
         self.applied: Floats = self._data.qfrc_applied
+        self._damping: Floats = self._model.dof_damping
 
     def refresh(self) -> None:
         """Computes everything again after `qpos` or `qvel` was written."""
@@ -46,6 +48,19 @@ class Engine:
         """One time step under the applied forces."""
         _mujoco.mj_step2(self._model, self._data)
         _mujoco.mj_step1(self._model, self._data)
+
+    def rub(self, dofs: NDArray[np.intp], friction_nm: Floats) -> None:
+        """Takes friction (n,) from the applied forces of the coming step.
+
+        Where it could turn a joint back within the step, it is integrated as that of a damper of friction / speed,
+        which brings the joint to rest and not beyond, however steep its law. `mj_step1` has put in the force of the
+        damper as it was before: that is given back.
+        """
+        speed = self.qvel[dofs]
+        self.applied[dofs] += self._damping[dofs] * speed - friction_nm
+        turned_back = np.abs(friction_nm) * self._model.opt.timestep > np.abs(speed) * self._model.dof_armature[dofs]
+        steep = turned_back & (speed != 0.0)
+        self._damping[dofs] = np.divide(friction_nm, speed, out=np.zeros_like(speed), where=steep)
 
     def joint_addresses(self, names: list[str]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
         """Where hinge joints stand in `qpos` and in `qvel`."""

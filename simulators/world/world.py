@@ -46,6 +46,7 @@ from simulators.world.optics import (
     trace,
 )
 from simulators.world.rig import Pose, WorldRig, read_rig
+from simulators.world.torque_mechanisms import TorqueMechanisms, with_true_masses
 from simulators.world.truth import Given, Truth, arm_of, draw_truth, given_truth
 
 Floats = NDArray[np.float64]
@@ -83,8 +84,18 @@ class World:
         self.truth = truth
         self.n_joints = len(truth.links)
         start_rad = self._checked(np.zeros(self.n_joints) if q_rad is None else q_rad)
+        stated, rig = rig, with_true_masses(rig, hidden)
         self._hidden = MovingMechanisms(hidden, arm_of(rig, truth)) if hidden else None
-        self._body = ArmBody(rig, truth, start_rad, np.random.default_rng(repeat_seed), self._hidden, rest_degC)
+        self._body = ArmBody(
+            rig,
+            truth,
+            start_rad,
+            np.random.default_rng(repeat_seed),
+            self._hidden,
+            rest_degC,
+            TorqueMechanisms(hidden, self.n_joints) if hidden else None,
+            stated if stated is not rig else None,
+        )
         self._detectors = (
             None
             if rig.fixture is None

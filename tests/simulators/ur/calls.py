@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from simulators.ur.controller_kinematics import IDENTITY, NominalArm, frame_of, pose_of
-from simulators.world.model import ARMATURE_KG_M2, build_mjcf
-from simulators.world.rig import read_rig
+from simulators.world.model import build_mjcf
+from simulators.world.rig import ARMATURE_KG_M2, read_rig
 from simulators.world.truth import draw_truth
 
 HOME = [0.0, -1.5, 1.5, -1.5, -1.5, 0.0]
