@@ -71,7 +71,8 @@ def check_recording(path: Path, *, as_json: bool = False, controller_arm: Path |
 
 def lines(recording: Recording, findings: tuple[Finding, ...]) -> list[str]:
     """For a person: the file, each stream with its rate and clock, each finding."""
-    reported = [f"{recording.path}: settled samples: {len(recording.samples)}, events: {len(recording.events)}"]
+    settled = f"settled samples: {len(recording.samples)}, " if recording.rig.n_joints else ""
+    reported = [f"{recording.path}: {settled}events: {len(recording.events)}"]
     reported += [
         f"  {stream.name}: {_rate(stream)}; {_clock(stream)}; time stamp: {stream.stamps}"
         for stream in recording.streams.values()

@@ -38,7 +38,8 @@ def export_command(recording: Path, *, out: Path, table: TableFormat = TableForm
         return
     with taken_back(out):
         export(source, out, table)
-        print(f"{out}: rig.toml and samples.{table.value}, samples: {len(source.samples)}")
-        whole = streams or source.rig.n_joints == 0  # of encoders alone the streams are all there is
+        alone = source.rig.n_joints == 0  # of encoders alone the streams are all there is
+        print(f"{out}: rig.toml" + ("" if alone else f" and samples.{table.value}, samples: {len(source.samples)}"))
+        whole = streams or alone
         for path in write_streams(source, out, table) if whole else ():
             print(f"{path}: {path.stat().st_size} bytes")

@@ -165,15 +165,20 @@ def _now(state: LogState) -> str:
 def _summary(state: LogState, segments: list[Path]) -> str:
     which = segments[0].name if len(segments) == 1 else f"{segments[0].name} to {segments[-1].name}"
     outages = f", outages: {state.outages}" if state.outages else ""
-    frames = f", frames: {state.frames}" if state.frames else ""
+    at_least = "at least " if state.outages else ""
+    gaps = "1 gap" if state.gaps == 1 else f"{state.gaps} gaps"
+    missing = f"{at_least}{state.missing} missing in {gaps}" if state.gaps else "no gaps"
+    frames = f"; frames: {state.frames}" if state.frames else ""
     errors = f", error frames among them: {state.error_frames}" if state.error_frames else ""
-    return f"{segments[0].parent}: {which}: rows: {state.rows}{frames}{errors}{outages}"
+    return f"{segments[0].parent}: {which}: rows: {state.rows}, {missing}{frames}{errors}{outages}"
 
 
 def _as_json(state: LogState, segments: list[Path]) -> dict[str, Any]:
     return {
         "segments": [str(path) for path in segments],
         "rows": state.rows,
+        "missing": state.missing,
+        "gaps": state.gaps,
         "frames": state.frames,
         "error_frames": state.error_frames,
         "outages": state.outages,

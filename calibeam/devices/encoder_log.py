@@ -38,6 +38,8 @@ class LogState:
 
     segment: Path
     rows: int  # SYNCs with an answer, over all segments of this run
+    missing: int  # rows that the gaps of the stream state as missing; of an outage that is not known
+    gaps: int
     frames: int
     error_frames: int
     outages: int
@@ -86,6 +88,8 @@ class EncoderLog:
         return LogState(
             self._recording.writer.path,
             self._rows,
+            self._stream.writer.missing if self._stream else 0,
+            self._stream.writer.gaps if self._stream else 0,
             frames.count if frames else 0,
             frames.errors if frames else 0,
             self._outages,

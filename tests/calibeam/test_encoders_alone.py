@@ -38,7 +38,9 @@ def test_they_are_checked_and_logged(site: Path, capsys: pytest.CaptureFixture[s
     run(["check", str(site / "rig.toml")])  # a busy machine may fall short of the rate
     assert "3 encoders on slcan" in capsys.readouterr().out
     assert run(["check", str(site / "log")]) == 0
-    assert "encoders: period " in capsys.readouterr().out
+    shown = capsys.readouterr().out
+    assert "encoders: period " in shown
+    assert "settled samples" not in shown
     recording = read(log_of(site))
     angles = recording.streams["encoders"].values["position_rad"]
     assert angles.shape[1] == 3

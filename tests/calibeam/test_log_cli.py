@@ -22,6 +22,7 @@ from acquisition.recording.mcap import Rotation, mcap_file, segments
 from acquisition.recording.mcap.mcap_file import DiskFile
 from acquisition.recording.rig import parse_rig
 from calibeam.cli import run
+from calibeam.commands.log import _summary as log_summary
 from calibeam.devices import encoder_log
 from calibeam.devices.encoder_log import EncoderLog, LogState
 from calibeam.devices.encoders import names_of
@@ -260,6 +261,10 @@ def test_what_a_library_raises_unforeseen_is_an_outage(tmp_path: Path, monkeypat
     until(log, lambda state: state.outages > 0 and state.away is None)
     (lost,) = [event for event in only(tmp_path / "log").events if event.kind == "device lost"]
     assert "KeyError: '1A01h'" in lost.detail["why"]
+    gaps = only(tmp_path / "log").streams["encoders"].gaps
+    assert [gap.missing for gap in gaps] == [-1, 1]  # the outage, and the row that was read while it began
+    assert (log.state.gaps, log.state.missing) == (2, 1)
+    assert f"rows: {log.state.rows}, at least 1 missing in 2 gaps, outages: 1" in log_summary(log.state, log.segments)
 
 
 def test_the_command_logs_exports_imports_recovers(
@@ -270,6 +275,8 @@ def test_the_command_logs_exports_imports_recovers(
     said = msgspec.json.decode(capsys.readouterr().out)
     (segment,) = segments(folder)
     assert said["segments"] == [str(segment)]
+    gaps = read(segment).streams["encoders"].gaps
+    assert (said["gaps"], said["missing"]) == (len(gaps), sum(max(gap.missing, 0) for gap in gaps))
     assert said["rows"] == read(segment).streams["encoders"].sequence.size > 0
     blf, back = tmp_path / "bus.blf", tmp_path / "back.mcap"
     assert run(["export", str(segment), "--out", str(blf)]) == 0

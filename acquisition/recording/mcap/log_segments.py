@@ -109,9 +109,11 @@ class SegmentedRecording:
         with self._turn:
             full, self.writer = self.writer, fresh
             for stream in self._streams:
+                before = stream.writer
                 stream.writer = fresh.stream(
-                    stream.name, stream.channels, stream.viewer, after=stream.writer.last, stamps=stream.stamps
+                    stream.name, stream.channels, stream.viewer, after=before.last, stamps=stream.stamps
                 )
+                stream.writer.gaps, stream.writer.missing = before.gaps, before.missing  # of the whole run
         full.close()
         return full.path
 

@@ -86,6 +86,7 @@ class StreamWriter:
         self._turn = threading.Lock()
         self._kinds: dict[str, str] = {}  # channel -> "i" or "f", from the first block
         self._last = after  # sequence and host time of the last sample
+        self.gaps = self.missing = 0  # gaps recorded so far; the samples that they state as missing
 
     @property
     def last(self) -> tuple[int, float] | None:
@@ -116,10 +117,12 @@ class StreamWriter:
             self._put(piece)
             self._last = int(piece.sequence[-1]), float(piece.host_s[-1])
             for gap in gaps:
-                self._put_gap(gap)
+                self.gap(gap)
 
     def gap(self, gap: Gap) -> None:
         """Record that samples are missing, where the caller knows more than the sequence shows: a lost cable."""
+        self.gaps += 1
+        self.missing += max(gap.missing, 0)
         self._put_gap(gap)
 
     def _values(self, channel: Channel, values: Mapping[str, ArrayLike]) -> NDArray[Any]:
