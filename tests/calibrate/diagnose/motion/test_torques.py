@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from benchmarks.drawn_motion import Hidden, recorded
 from calibrate.diagnose.assess.diagnosis import Verdict
 from calibrate.diagnose.motion import diagnose_torques
-from tests.calibrate.diagnose.motion.moving_arm import Hidden, recorded
 
 OF_ITS_SIZE = 0.02
 

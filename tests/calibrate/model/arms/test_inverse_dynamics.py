@@ -8,10 +8,10 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from acquisition.recording.rig import load_rig
+from benchmarks.drawn_motion import in_mujoco
 from calibrate.model.arms.catalogue import arm_of
 from calibrate.model.arms.inverse_dynamics import NUMBERS, torque_columns
 from calibrate.model.parameters import start_values
-from tests.calibrate.model.arms.in_mujoco import in_mujoco
 
 RIGS = Path(__file__).parents[4] / "rigs"
 GRAVITY = np.array([0.6, -0.3, -9.7])
