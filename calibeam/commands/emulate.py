@@ -81,9 +81,9 @@ def emulate(
     model
         A model.json: the emulated rig has its geometry, and a mechanism for each effect that holds on any day.
     hide
-        A mechanism to put in: its name, its place (joint2, link3, psd1) and its size in SI units (rad/Nm, m, rad,
-        1/K); further quantities as key=value. A wrong name lists all of them with their units. May be given several
-        times.
+        A mechanism to put in: its name, its place (joint2, link3, psd1) and its size in SI units (Nm, rad/Nm, m,
+        rad, 1/K); further quantities as key=value. A wrong name lists all of them with their units. May be given
+        several times.
 
     """
     from simulators.serve import ServeOptions, serve  # the physics takes a second to load: only here

@@ -1,5 +1,6 @@
 """`calibeam emulate --model` and `--hide`: the emulated world has the model's geometry and the mechanisms asked for."""
 
+import re
 import tomllib
 from pathlib import Path
 
@@ -14,7 +15,7 @@ from calibeam.simulation.mechanism_by_hand import BY_HAND, by_hand, form, unit_o
 from calibrate.errors import DataError
 from calibrate.model.model_file import RigIdentity
 from calibrate.model.predict import Predictor
-from simulators.defects import WrittenError
+from simulators.defects import GIVEN, WrittenError, torque
 from simulators.defects.drive import SlackDrive, SoftJoint
 from simulators.defects.fixture import BumpedFixture
 from simulators.world.world import World
@@ -111,11 +112,21 @@ def test_mechanisms_by_hand() -> None:
         ("soft-joint joint2 stiff", "no size and no place"),
         ("soft-joint joint2 8e-6 colour=3", "nothing called colour"),
         ("", "no mechanism of this name"),
+        ("coulomb joint3 -4.0", r"coulomb: Expected `float` >= 0.0 - at `\$.coulomb_nm`"),
+        ("late-torque joint2 1.0", r"late-torque: Expected `float` <= 0.1"),
+        ("stribeck joint4 5.0", "speed_rad_s missing; it takes stribeck jointN SIZE"),
     ],
 )
 def test_a_wrong_line_says_what_is_wrong(line: str, says: str) -> None:
     with pytest.raises(WrittenError, match=says):
         by_hand(line, PLAIN)
+
+
+def test_the_page_lists_every_mechanism_of_torque_as_it_is_written() -> None:
+    page = Path("docs/simulation.md").read_text(encoding="utf-8")
+    made = [by_hand(text, PLAIN) for text in re.findall(r"^\| `(\S+ .+)` \|", page, re.MULTILINE)]
+    assert {type(one) for one in made} == {kind for kind in GIVEN if kind.__module__ == torque.__name__}
+    assert by_hand("gear-ripple joint5 1.5 order=2", PLAIN) == torque.GearRipple(5, 1.5, 2, 101.0)
 
 
 def test_a_wrong_name_lists_every_mechanism_with_its_unit() -> None:
