@@ -203,7 +203,7 @@ def figures() -> tuple[Figure, ...]:
 
 TODAY = {
     "files": 786,
-    "code": 84_416,
+    "code": 84_436,
     "longest_function": 53,
     "one_importer": 2,
     "classes": 0,
