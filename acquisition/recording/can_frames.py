@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from acquisition.recording.recording import Channel, Stream
 from acquisition.recording.samples import Floats
@@ -64,8 +64,14 @@ def block_of(frames: Sequence[Frame], width: int = CLASSIC_BYTES) -> FrameBlock:
     longest = max([len(frame.data) for frame in frames], default=0)
     if longest > width:
         raise ValueError(f"a CAN frame of {longest} bytes in a stream of {width}; open the stream for CAN FD")
-    payload = b"".join([frame.data.ljust(width, b"\0") for frame in frames])
-    host_s, device_s, can_id, flags, length, _ = zip(*frames, strict=True) if frames else ((),) * 6
+    *columns, payloads = zip(*frames, strict=True) if frames else ((),) * 6
+    return frame_block(columns, payloads, width)
+
+
+def frame_block(columns: Sequence[ArrayLike], payloads: Sequence[bytes | bytearray], width: int) -> FrameBlock:
+    """Of the first five columns of `Frame`, (frame,) each, and of payloads that are no longer than `width`."""
+    payload = b"".join([data.ljust(width, b"\0") for data in payloads])
+    host_s, device_s, can_id, flags, length = columns
     return FrameBlock(
         np.array(host_s, dtype=np.float64),
         np.array(device_s, dtype=np.float64),

@@ -11,7 +11,7 @@ Apart from `can_frames`, because this loads python-can, and a fit reads recordin
 import math
 import struct
 import zlib
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from functools import partial
@@ -31,9 +31,11 @@ from acquisition.recording.can_frames import (
     CLASSIC_BYTES,
     FD_BYTES,
     Frame,
+    FrameBlock,
     FrameFlag,
     block_of,
     channels,
+    frame_block,
     frames_of,
     is_frames,
     stream_names,
@@ -53,6 +55,7 @@ _FLAGS = (
 )
 _SENT = int(FrameFlag.SENT)
 _flagged = attrgetter(*(name for name, _ in _FLAGS))  # in one call: nearly all frames have none of them
+_PLAIN = (False,) * len(_FLAGS)
 
 
 def frame_of(message: can.Message, host_s: float, *, sent: bool) -> Frame:
@@ -63,6 +66,24 @@ def frame_of(message: can.Message, host_s: float, *, sent: bool) -> Frame:
         data = b"" if message.is_remote_frame else data
     stamp_s = math.nan if sent or not message.timestamp else message.timestamp
     return Frame(host_s, stamp_s, message.arbitration_id, flags, message.dlc, bytes(data))
+
+
+def plain_block(heard: Sequence[tuple[Sequence[can.Message], float, bool]]) -> FrameBlock | None:
+    """What `block_of` makes of the frames of (messages, host_s, sent), in two thirds of the time: no object a frame.
+
+    None where one of them is no data frame of up to 8 bytes with an identifier of 11 bits.
+    """
+    messages = [message for several, _, _ in heard for message in several]
+    payloads = [message.data for message in messages]
+    plain = list(map(_flagged, messages)).count(_PLAIN) == len(messages)
+    if not plain or max(map(len, payloads), default=0) > CLASSIC_BYTES:
+        return None
+    counts = [len(several) for several, _, _ in heard]
+    host_s, sent = np.repeat([each[1] for each in heard], counts), np.repeat([each[2] for each in heard], counts)
+    stamps_s = np.array([message.timestamp for message in messages], dtype=np.float64)
+    device_s, flags = np.where(sent | (stamps_s == 0.0), math.nan, stamps_s), np.where(sent, _SENT, 0)
+    can_id, length = [message.arbitration_id for message in messages], [message.dlc for message in messages]
+    return frame_block((host_s, device_s, can_id, flags, length), payloads, CLASSIC_BYTES)
 
 
 def message_of(frame: Frame, time_s: float, channel: int | str | None) -> can.Message:

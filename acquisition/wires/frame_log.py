@@ -15,12 +15,17 @@ from acquisition.recording.can_frames import (
     FD_STREAM,
     STREAM,
     Frame,
+    FrameBlock,
     FrameFlag,
     block_of,
     channels,
 )
+<<<<<<< HEAD
 from acquisition.recording.can_log import frame_of
 from acquisition.recording.rig.devices import HARDWARE_STAMPS
+=======
+from acquisition.recording.can_log import frame_of, plain_block
+>>>>>>> 709bac341228b16cd127a032e5612bdf81a90410
 from drivers.clock import Clock
 from drivers.device import Stamps
 
@@ -69,9 +74,7 @@ class FrameLog:
         self.count = 0  # frames heard so far
         self.errors = 0  # error frames among them
         self._recording = recording
-        self._classic = _Counted(
-            recording.stream(STREAM, channels(CLASSIC_BYTES), viewer=(), stamps=stamps), CLASSIC_BYTES
-        )
+        self._classic = _Counted(recording.stream(STREAM, channels(CLASSIC_BYTES), viewer=(), stamps=stamps))
         self._long: _Counted | None = None
         self._now_s: Callable[[], float] = clock.now_s
         self._turn = threading.Lock()
@@ -100,6 +103,11 @@ class FrameLog:
         heard, self._heard = self._heard, []
         if not heard:
             return
+        block = plain_block(heard)
+        if block is not None:
+            self.count += len(block.host_s)
+            self._classic.append(block)
+            return
         frames = [frame_of(message, host_s, sent=sent) for messages, host_s, sent in heard for message in messages]
         self.count += len(frames)
         self.errors += sum([frame.flags & _ERROR > 0 for frame in frames])
@@ -107,25 +115,22 @@ class FrameLog:
         if long:
             self._write_long(long)
             frames = [frame for frame in frames if len(frame.data) <= CLASSIC_BYTES]
-        self._classic.append(frames)
+        self._classic.append(block_of(frames, CLASSIC_BYTES))
 
     def _write_long(self, frames: Sequence[Frame]) -> None:
         if self._long is None:
-            self._long = _Counted(
-                self._recording.stream(FD_STREAM, channels(FD_BYTES), viewer=(), stamps=self._stamps), FD_BYTES
-            )
-        self._long.append(frames)
+            self._long = _Counted(self._recording.stream(FD_STREAM, channels(FD_BYTES), viewer=(), stamps=self._stamps))
+        self._long.append(block_of(frames, FD_BYTES))
 
 
 class _Counted:
-    """A stream of frames up to `width` bytes, numbered as they come."""
+    """A stream of frames, numbered as they come."""
 
-    def __init__(self, stream: FrameStream, width: int) -> None:
-        self._stream, self._width, self._next = stream, width, 0
+    def __init__(self, stream: FrameStream) -> None:
+        self._stream, self._next = stream, 0
 
-    def append(self, frames: Sequence[Frame]) -> None:
-        if not frames:
+    def append(self, block: FrameBlock) -> None:
+        if not block.host_s.size:
             return
-        block = block_of(frames, self._width)
-        first, self._next = self._next, self._next + len(frames)
+        first, self._next = self._next, self._next + block.host_s.size
         self._stream.append(block.host_s, block.device_s, np.arange(first, self._next), block.values)

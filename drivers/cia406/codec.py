@@ -8,7 +8,6 @@ import struct
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum, IntFlag
-from typing import NamedTuple
 
 DEVICE_TYPE = 0x1000
 ERROR_REGISTER = 0x1001
@@ -173,6 +172,11 @@ class Slip:
     size_rad: float
 
 
+# A position made continuous in units, its time in s, and how fast it was moving then, in units a second (NaN: not known
+# yet). No class: thousands a second are made of these.
+_Reading = tuple[int, float, float]
+
+
 class ContinuousAngle:
     """Unwraps one encoder's position. The first reading lies within half the range of zero.
 
@@ -204,8 +208,9 @@ class ContinuousAngle:
         """Angle in rad for a position read at `time_s`, or NaN."""
         last = self._last
         if last is None:
-            self._last = _Reading(self._step(position, 0), time_s, math.nan)
-            return self._last.units * self._unit_rad
+            units = (position + self._half) % self._range - self._half
+            self._last = units, time_s, math.nan
+            return units * self._unit_rad
         if self._uncertain:
             before = self._uncertain[-1]
             reading, is_motion = self._next(before, position, time_s)
@@ -215,9 +220,9 @@ class ContinuousAngle:
         reading, is_motion = self._next(last, position, time_s)
         if is_motion:
             return self._accept(reading)
-        return self._hold_back(_Reading(reading.units, time_s, last.rate), last)
+        return self._hold_back((reading[0], time_s, last[2]), last)
 
-    def _hold_back(self, reading: "_Reading", last: "_Reading") -> float:
+    def _hold_back(self, reading: _Reading, last: _Reading) -> float:
         """NaN, or the angle after a slip when enough readings agree."""
         self.jumps += 1
         self._uncertain.append(reading)
@@ -225,44 +230,34 @@ class ContinuousAngle:
             return math.nan
         return self._slipped(last, self._uncertain[0], reading)
 
-    def _slipped(self, last: "_Reading", first: "_Reading", reading: "_Reading") -> float:
-        rate = 0.0 if math.isnan(last.rate) else last.rate
-        unmoved = last.units + rate * (first.time_s - last.time_s)
-        slip = Slip(first.time_s, (first.units - unmoved) * self._unit_rad)
+    def _slipped(self, last: _Reading, first: _Reading, reading: _Reading) -> float:
+        (units, last_s, rate), (units_then, first_s, _) = last, first
+        unmoved = units + (0.0 if math.isnan(rate) else rate) * (first_s - last_s)
+        slip = Slip(first_s, (units_then - unmoved) * self._unit_rad)
         self.slips = (*self.slips, slip)[-SLIPS_KEPT:]
         self.slip_rad += slip.size_rad
         return self._accept(reading)
 
-    def _accept(self, reading: "_Reading") -> float:
-        last, units = self._last, reading.units
+    def _accept(self, reading: _Reading) -> float:
+        last, units = self._last, reading[0]
         if last is not None:
-            self.wraps += abs(units // self._range - last.units // self._range)
+            self.wraps += abs(units // self._range - last[0] // self._range)
         self._last = reading
         self._uncertain.clear()
         return units * self._unit_rad
 
-    def _next(self, before: "_Reading", position: int, time_s: float) -> tuple["_Reading", bool]:
+    def _next(self, before: _Reading, position: int, time_s: float) -> tuple[_Reading, bool]:
         """The reading after another, and whether the step to it is motion. Every frame comes here: no further calls."""
         units, before_s, rate = before
         step = (position - units + self._half) % self._range - self._half
         elapsed_s = time_s - before_s
-        reading = _Reading(units + step, time_s, step / elapsed_s if elapsed_s > 0.0 else rate)
+        reading = units + step, time_s, step / elapsed_s if elapsed_s > 0.0 else rate
         unit_rad = self._size_rad
-        if abs(step) * unit_rad > self._speed_limit_rad_s * max(elapsed_s, TIME_SCATTER_S) + unit_rad:
+        limit_s = elapsed_s if elapsed_s > TIME_SCATTER_S else TIME_SCATTER_S
+        if abs(step) * unit_rad > self._speed_limit_rad_s * limit_s + unit_rad:
             return reading, False
-        if math.isinf(self._acceleration_limit_rad_s2) or math.isnan(rate):
+        if self._acceleration_limit_rad_s2 == math.inf or math.isnan(rate):
             return reading, True
         off_rad = abs(step - rate * elapsed_s) * unit_rad
         scatter_rad = 2.0 * abs(rate) * unit_rad * TIME_SCATTER_S
         return reading, off_rad <= self._acceleration_limit_rad_s2 * elapsed_s**2 + scatter_rad + 2.0 * unit_rad
-
-    def _step(self, position: int, old: int) -> int:
-        return (position - old + self._half) % self._range - self._half
-
-
-class _Reading(NamedTuple):  # and no dataclass: thousands a second are made of these
-    """A position made continuous, and how fast it was moving then, in units a second; NaN: not known yet."""
-
-    units: int
-    time_s: float
-    rate: float

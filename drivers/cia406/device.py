@@ -244,12 +244,19 @@ class Cia406Encoders(StreamDevice[can.BusABC]):
             self._add(self._cycle.give_up(now_s))
             return
         self._watch.heartbeats.look(now_s)
+        cycle, place_of = self._cycle, self._node_of_pdo.get
         for message in messages:
-            place = self._node_of_pdo.get(message.arbitration_id)
+            place = place_of(message.arbitration_id)
             if place is None or message.is_extended_id or message.is_remote_frame or message.is_error_frame:
                 self._take(message, now_s)
-            else:
-                self._take_position(place, message.data, now_s)
+                continue
+            units = self._positions[place].read(message.data)
+            if units is None:
+                self._bad_lines += 1
+            elif cycle.awaits(place):
+                rows = cycle.answer(place, self._angles[place].follow(units, now_s), now_s)
+                if rows:
+                    self._add(rows)
 
     def _take(self, message: can.Message, now_s: float | None = None) -> None:
         """A heartbeat, an emergency, an error, or nothing of ours; heard now unless a time is given."""
@@ -258,15 +265,6 @@ class Cia406Encoders(StreamDevice[can.BusABC]):
             self._faults.take(message, at_s)
         elif not (message.is_extended_id or message.is_remote_frame):
             self._watch.take(message.arbitration_id, bytes(message.data), at_s)
-
-    def _take_position(self, place: int, data: bytes | bytearray, now_s: float) -> None:
-        units = self._positions[place].read(data)
-        if units is None:
-            self._bad_lines += 1
-        elif self._cycle.awaits(place):
-            rows = self._cycle.answer(place, self._angles[place].follow(units, now_s), now_s)
-            if rows:
-                self._add(rows)
 
     def _check_silence(self, now_s: float) -> None:
         # No more than twice as long: benches stop their arm after 1 s.

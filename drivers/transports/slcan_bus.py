@@ -12,7 +12,6 @@ import time
 from collections import deque
 from contextlib import suppress
 from functools import lru_cache
-from string import hexdigits
 from typing import Any
 
 import can
@@ -168,9 +167,15 @@ def _read(descriptor: int) -> bytes | None:
 def classic_frame(line: str) -> can.Message | None:
     """A data frame with an identifier of 11 bits, "tIIILDD..", which nearly all are; None for all else."""
     head = _head(line[:5])
-    if head is None or len(line) != 5 + 2 * head[1] or line[5:].strip(hexdigits):
+    if head is None or len(line) != 5 + 2 * head[1]:
         return None
-    return can.Message(NO_STAMP, head[0], False, dlc=head[1], data=bytearray.fromhex(line[5:]))
+    try:
+        data = bytearray.fromhex(line[5:])
+    except ValueError:
+        return None
+    if len(data) != head[1]:  # it skips blanks
+        return None
+    return can.Message(NO_STAMP, head[0], False, False, False, None, head[1], data)
 
 
 @lru_cache(maxsize=4096)  # a bus has few different ones

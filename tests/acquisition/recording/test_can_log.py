@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from acquisition.recording.can_frames import Frame, FrameFlag, block_of, channels, frames_of, stream_names
-from acquisition.recording.can_log import SUFFIXES, export_can, frame_of, import_can
+from acquisition.recording.can_log import SUFFIXES, export_can, frame_of, import_can, plain_block
 from acquisition.recording.check_recording import Problem, check
 from acquisition.recording.errors import RecordingError
 from acquisition.recording.mcap.read import read
@@ -54,6 +54,29 @@ def record_frames(open_writer: Open) -> Callable[..., Recording]:
         return read(writer.path)
 
     return made
+
+
+def test_plain_frames_make_the_same_block_as_one_by_one() -> None:
+    plain = [message for message in messages() if not (message.is_extended_id or message.is_remote_frame)]
+    plain[3].timestamp = 0.0
+    heard = [(plain[:4], 50.0, False), ([], 50.5, True), (plain[4:5], 51.0, True), (plain[5:], 52.0, False)]
+    slowly = block_of([frame_of(m, host_s, sent=sent) for several, host_s, sent in heard for m in several])
+    block = plain_block(heard)
+    assert block is not None
+    assert block.values.keys() == slowly.values.keys()
+    for name in slowly.values:
+        np.testing.assert_array_equal(block.values[name], slowly.values[name], strict=True)
+    np.testing.assert_array_equal(block.host_s, slowly.host_s, strict=True)
+    np.testing.assert_array_equal(block.device_s, slowly.device_s, strict=True)
+
+
+@pytest.mark.parametrize(
+    "kind", [{"is_extended_id": True}, {"is_remote_frame": True}, {"is_error_frame": True}, {"is_fd": True}]
+)
+def test_a_block_with_another_frame_is_not_plain(kind: dict[str, bool]) -> None:
+    other = can.Message(**{"is_extended_id": False, "data": b"1"} | kind)
+    assert plain_block([(messages()[1:3], 50.0, False), ([other], 51.0, False)]) is None
+    assert plain_block([([can.Message(is_extended_id=False, data=bytes(9))], 50.0, False)]) is None
 
 
 def kinds(recording: Recording) -> list[tuple[int, int, int, bytes]]:

@@ -108,8 +108,11 @@ def test_a_line_may_come_in_two_pieces(adapter: Adapter, at: int) -> None:
     assert before + heard(adapter.bus, len(FRAMES) - whole) == FRAMES
 
 
-def test_a_line_that_makes_no_sense_is_refused_as_python_can_does_and_the_next_is_read(adapter: Adapter) -> None:
-    adapter.says(b"t2814xyz\rt0800\r")
+@pytest.mark.parametrize("digits", [b"xyz", b"0102030x", b"+1020304"])
+def test_a_line_that_makes_no_sense_is_refused_as_python_can_does_and_the_next_is_read(
+    adapter: Adapter, digits: bytes
+) -> None:
+    adapter.says(b"t2814" + digits + b"\rt0800\r")
     with pytest.raises(ValueError, match="hexadecimal"):
         adapter.bus.recv(2.0)
     assert heard(adapter.bus, 1) == [(0x080, False, b"")]
