@@ -20,12 +20,8 @@ from acquisition.recording.can_frames import (
     block_of,
     channels,
 )
-<<<<<<< HEAD
-from acquisition.recording.can_log import frame_of
-from acquisition.recording.rig.devices import HARDWARE_STAMPS
-=======
 from acquisition.recording.can_log import frame_of, plain_block
->>>>>>> 709bac341228b16cd127a032e5612bdf81a90410
+from acquisition.recording.rig.devices import HARDWARE_STAMPS
 from drivers.clock import Clock
 from drivers.device import Stamps
 
