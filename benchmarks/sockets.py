@@ -19,12 +19,15 @@ from calibeam.new_rig.drawn import poe_text
 from calibeam.new_rig.from_urdf import urdf_arm
 from calibeam.results.identification import identify_session, session_model
 from calibrate.apply.predicting import predict_with_physics
+from calibrate.diagnose.assess.diagnosis import Finding
+from calibrate.diagnose.from_recording import diagnose_samples
 from calibrate.model.arms.catalogue import arm_of
 from calibrate.model.model_file import ModelFile
 from calibrate.model.parameters import start_values
 from calibrate.model.sensors.seat import TIP
 
 APART_M, SIGMA_M = 0.05, 0.03e-3  # of the two sockets: as drawn, and what a caliper resolves (DIN 862: 0.03 mm)
+FIRST_REFITTED, REFITTED_M = 9, np.array([1e-3, 0.0, 0.0])  # the fifth of eight places
 HEAD = "| left out | rows | from the mean of the socket | distance of the sockets less 50 mm |"
 Floats = NDArray[np.float64]
 
@@ -92,6 +95,30 @@ def left_out(recording: Recording) -> Iterator[Pair]:
         yield pairs_of(model, unseen)[place]
 
 
+def refitted(recording: Recording, first_seat: int, shift_m: Floats) -> Recording:
+    """As if the ball had been fixed again, by a shift (3,) in the flange, before the first row of a seat: from there on
+    the least change of the joint angles that leaves the ball where it was. The rest of each row's misfit stays.
+    """
+    arm, samples = arm_of(recording.rig), recording.samples
+    theta, q_rad = start_values(arm.parameters), samples.joints().copy()
+    late = np.flatnonzero(samples.integers(SEAT, 0) >= first_seat)
+    T = arm.flange(theta, q_rad[late])
+    tip = arm.joint_twists(theta, q_rad[late])  # of the flange about the base: [v; w]
+    by_joint = tip[:, :3] + np.cross(tip[:, 3:], T[:, :3, 3][:, :, None], axis=1)
+    q_rad[late] -= np.einsum("njk,nk->nj", np.linalg.pinv(by_joint), T[:, :3, :3] @ shift_m)
+    columns = {f"q{j + 1}_rad": q_rad[:, j] for j in range(samples.n_joints)}
+    return replace(recording, samples=Samples({**samples.columns, **columns}, samples.n_joints))
+
+
+def found_again(recording: Recording, first_seat: int, shift_m: Floats) -> list[Finding]:
+    """What a diagnosis names as a moved tool where the ball was fixed again."""
+    changed = refitted(recording, first_seat, shift_m)
+    found = diagnose_samples(changed.rig, changed.samples, np.random.default_rng(1))
+    if found.physics is None:
+        return []
+    return [f for f in found.physics.diagnosis.findings if f.name.physics == "tool-moved"]
+
+
 def lines(folder: Path) -> Iterator[str]:
     """A line a place, and the means; one line that says so where the recording is not there."""
     if not folder.is_dir():
@@ -111,6 +138,10 @@ def lines(folder: Path) -> Iterator[str]:
         model, _ = model_without(recording, None)
         whole = list(pairs_of(model, recording.samples).values())
         yield _line("none", whole)
+        again = found_again(recording, FIRST_REFITTED, REFITTED_M)
+        yield f"ball shifted by 1 mm from seat {FIRST_REFITTED} on: " + (
+            "; ".join(f.says for f in again) or "not named"
+        )
     for what, some in (("left out", found), ("none left out", whole)):
         scale = np.array([pair.length_error_m for pair in some]) / APART_M
         sigma = scale.std(ddof=1) / np.sqrt(len(scale))

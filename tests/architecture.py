@@ -203,7 +203,7 @@ def figures() -> tuple[Figure, ...]:
 
 TODAY = {
     "files": 789,
-    "code": 84_940,
+    "code": 85_000,
     "longest_function": 53,
     "one_importer": 2,
     "classes": 0,

@@ -127,6 +127,7 @@ def import_command(
         _folder(source, out, restore_stamps=restore_stamps)
         return
     if restore_stamps and source.suffix.lower() == ".mcap" and rig is None:
+        _refuse(source, "a recording has its own streams", columns=columns, streams=streams, stamps=stamps)
         _restored_recording(source, others, out)
         return
     for path in (source, *others):

@@ -358,7 +358,9 @@ def _session_with_tracker(wanted: Wanted, tracker: TrackerOptions, page: PageOpt
 def _session_by_hand(wanted: Wanted, hand: HandOptions, console: Console) -> None:
     """The session of a measuring arm: a person moves the probe, or an emulated hand."""
     rig, verify, (poses, _) = wanted.rig, hand.verify, wanted.poses()
-    options = GuidedOptions(hand.postures or GuidedOptions.postures, hand.lengths, wanted.seed)
+    options = GuidedOptions(
+        GuidedOptions.postures if hand.postures is None else hand.postures, hand.lengths, wanted.seed
+    )
     visits = plan_of(rig, options, verify=verify) if poses is None else planned_visits(poses, rig)
     encoders = encoder_address(rig, hurry=wanted.emulators.time_scale)
     control = wanted.emulators.address()

@@ -57,6 +57,8 @@ class KnownContacts:
 
 def touch_rig_text(rig: Rig, text: str, options: TouchOptions, known: KnownContacts) -> str:
     """The rig file with `[noise] seat_m` and one `[[known_distance]]` for each place. AcquisitionError."""
+    if rig.tool.point_m is None:
+        raise AcquisitionError(f"rig {rig.name}: [tool] has no point_m; give the ball's place at the flange, about")
     if known.distance_m is not None:
         if options.seats != 2:
             raise AcquisitionError(f"--distance with --seats {options.seats}: it is that of two sockets; leave it out")
@@ -122,7 +124,11 @@ class TouchFolder:
         samples = read_folder(self.path).samples
         names = {kind: samples.integers(kind, 0) for kind in (SEAT, PLANE) if kind in samples}
         for row, (t_s, q_rad) in enumerate(zip(samples.column("t_s"), samples.joints(), strict=True)):
-            kind, numbers = next((kind, ids) for kind, ids in names.items() if ids[row] > 0)
+            kind, numbers = next(((kind, ids) for kind, ids in names.items() if ids[row] > 0), ("", None))
+            if numbers is None:
+                raise RecordingError(
+                    f"{self.path / CSV}: row {row + 1} names no seat and no plane; correct or delete it"
+                )
             contact = Contact(PLANE if kind == PLANE else SEAT, int(numbers[row]), f"{kind} {numbers[row]}")
             self.earlier.append(Reading(contact, q_rad, float(t_s), 0.0))
         pause_s = max(0.0, time.time() - (self.path / CSV).stat().st_mtime)
@@ -254,8 +260,6 @@ def run_touch(
     seed: int = 1,
 ) -> TouchSession:
     """The whole session into `folder`. PartialResult when it ended early: what was taken is kept."""
-    if rig.tool.point_m is None:
-        raise AcquisitionError(f"rig {rig.name}: [tool] has no point_m; give the ball's place at the flange, about")
     clock = SystemClock()
     if options.seats and known.distance_m is None and not rig.known_distances:
         console.print(

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from rich.table import Table
 
 from calibeam.console import Console
-from calibrate.diagnose.record.schema import ClockRecord, DiagnosisFile, FindingRecord, TorquesRecord
+from calibrate.diagnose.record.schema import ClockRecord, DiagnosisFile, FindingRecord, TorquesRecord, of_poses
 from calibrate.model.effects.term import with_sigma
 from calibrate.quantities import counted
 from calibrate.report.diagnosis import (
@@ -76,7 +76,7 @@ def calibration_lines(answers: Answers, diagnosis: DiagnosisFile | None, kept: s
     yield judged.sentence
     yield f"trust: {judged.trust.value}"
     yield from (f"  {reason}" for reason in judged.reasons[:FEW])
-    found = () if diagnosis is None else diagnosis.findings
+    found = () if diagnosis is None else of_poses(diagnosis)
     for number, one in enumerate(found[:CAUSES], start=1):
         yield f"{number}. {one.says} (confidence {one.confidence:.2f})"
     if len(found) > CAUSES:

@@ -16,6 +16,7 @@ from drivers.errors import DeviceError, DeviceRefused, DeviceStale
 from drivers.transports.slcan_bus import BlockSlcanBus, classic_frame
 
 TURN_MS = 60_000
+AGAIN_MS = 1000.0  # farther from what has passed on the host, and the adapter's clock has begun again
 ANSWER_S = 1.0  # a USB adapter answers within milliseconds
 _STAMPED = re.compile(
     r"(?:t[0-9A-F]{3}|T[0-9A-F]{8})(?P<length>[0-8])(?P<data>(?:[0-9A-F]{2})*)(?P<stamp>[0-9A-F]{4})"
@@ -30,20 +31,36 @@ class MinuteClock:
     """Stamps of an adapter that begin again every minute, made continuous, in seconds.
 
     Of all times with the same milliseconds in the minute it takes the nearest to the last one plus what has passed on
-    the host since: right while frames wait less than half a minute, however long the bus was quiet, and also when the
-    adapter is opened again. It begins in the second minute, because a stamp of 0 counts as none.
+    the host since: right while frames wait less than half a minute, however long the bus was quiet. An adapter that was
+    opened again may have begun at nought: the first stamp then counts from the host's time, and all later ones from it.
+    It begins in the second minute, because a stamp of 0 counts as none.
     """
 
     def __init__(self) -> None:
         self._last: tuple[int, float] | None = None  # ms of the adapter, host time
+        self._opened_again = False
+        self._ahead_ms = 0  # by which this time is ahead of the adapter's own
+
+    def opened(self) -> None:
+        """The adapter was opened, for the first time or again."""
+        self._opened_again = self._last is not None
 
     def follow(self, stamp_ms: int, host_s: float) -> float:
         """The time in s of a stamp of 0 to 59999 that came at `host_s`."""
         last_ms, last_s = self._last or (stamp_ms + TURN_MS, host_s)
         expected_ms = last_ms + 1e3 * (host_s - last_s)
-        at_ms = stamp_ms + TURN_MS * round((expected_ms - stamp_ms) / TURN_MS)
+        if self._opened_again and not self._near(stamp_ms, expected_ms):
+            self._ahead_ms = round(expected_ms) - stamp_ms
+        self._opened_again = False
+        own_ms = stamp_ms + self._ahead_ms
+        at_ms = own_ms + TURN_MS * round((expected_ms - own_ms) / TURN_MS)
         self._last = at_ms, host_s
         return 1e-3 * at_ms
+
+    def _near(self, stamp_ms: int, expected_ms: float) -> bool:
+        """Whether the adapter's clock has gone on."""
+        off_ms = (stamp_ms + self._ahead_ms - expected_ms + TURN_MS / 2.0) % TURN_MS - TURN_MS / 2.0
+        return abs(off_ms) < AGAIN_MS
 
 
 class StampedSlcanBus(BlockSlcanBus):
@@ -65,6 +82,7 @@ class StampedSlcanBus(BlockSlcanBus):
         """python-can opens twice; only before the first time is the channel closed."""
         if not self._stamps:
             self._ask_for_stamps()
+            self._minutes.opened()
             self._stamps = True
         super().open()
 

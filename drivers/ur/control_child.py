@@ -15,6 +15,7 @@ import socket
 import sys
 import time
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from functools import partial
 from typing import Any, Protocol
 
@@ -136,9 +137,13 @@ class ControlChild:
                     stopped = self._control.servoStop(deceleration)
                     self._renew()
                     return self._judge(stopped)
-                case Freedrive(on):
-                    self._freedrive = on
-                    return self._judge(self._control.freedriveMode() if on else self._control.endFreedriveMode())
+                case Freedrive(True):
+                    self._freedrive = True  # before it is: also a call that fails may have switched it on
+                    return self._judge(self._control.freedriveMode())
+                case Freedrive():
+                    ended = self._control.endFreedriveMode()
+                    self._freedrive = not ended
+                    return self._judge(ended)
         except (RuntimeError, ValueError, TypeError) as error:  # what ur_rtde throws for arguments out of range
             return Ended(Outcome.REFUSED, str(error))
 
@@ -208,8 +213,8 @@ class ControlChild:
 
     def _brake(self, deceleration_rad_s2: float) -> None:
         if self._freedrive:  # a stop ends it, too: nobody expects an arm that was stopped to give way
-            self._freedrive = False
-            self._control.endFreedriveMode()
+            with suppress(RuntimeError):  # it brakes all the same
+                self._freedrive = not self._control.endFreedriveMode()
         if self._servoing:  # the script's servo thread would go on under a stopj
             self._servoing = False
             self._control.servoStop(deceleration_rad_s2)
@@ -242,8 +247,10 @@ def main(arguments: Sequence[str]) -> int:
         child.run()
     except (ParentGone, ConnectionError):
         signal.setitimer(signal.ITIMER_REAL, LAST_WORDS_S)  # its default action ends the process, whatever it waits for
-        child.halt()
-        control.stopScript()
+        try:
+            child.halt()
+        finally:
+            control.stopScript()
         return 3
     control.stopScript()
     return 0

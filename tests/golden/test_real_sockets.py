@@ -56,6 +56,17 @@ def test_each_place_in_turn_is_predicted_to_the_published_figures(recording):
     assert abs(scale) < SCALE
 
 
+@pytest.mark.endure
+def test_a_ball_that_was_fixed_again_is_named_with_its_moment_and_its_size(recording):
+    seat = recording.samples.integers("seat", 0)
+    first = int(np.flatnonzero(seat >= sockets.FIRST_REFITTED)[0])
+    found = sockets.found_again(recording, sockets.FIRST_REFITTED, sockets.REFITTED_M)
+    (moved,) = [f for f in found if f.confidence > 0.5]
+    assert moved.parameters["time_s"].value == pytest.approx(first - 0.5, abs=1.0)  # rows stand a second apart
+    shift_m = np.array([moved.parameters[f"shift_{axis}_m"].value for axis in "xyz"])
+    assert np.linalg.norm(shift_m - sockets.REFITTED_M) < 0.3e-3
+
+
 @pytest.mark.parametrize(("change", "found"), [({"length_m": 0.053}, 5), ({"to_placement": 8}, 5)])
 def test_a_wrong_note_of_one_place_is_named(recording, change, found):
     stated = list(recording.rig.known_distances)

@@ -7,13 +7,14 @@ model, ICRA 1997). Rows stand as far apart as the low pass makes them independen
 Where a joint stands or turns back, friction is anything between its two senses: its torque there is left out.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.recording import Recording
-from calibrate.diagnose.streams import devices_of
+from calibrate.diagnose.streams import StreamDevice, Track, devices_of
+from calibrate.diagnose.streams.recorded import start_between
 from calibrate.diagnose.streams.track import SIGMA_OF_MEDIAN
 
 Floats = NDArray[np.float64]
@@ -39,6 +40,7 @@ class Motion:
     q_rad: Floats  # (moment, joint)
     qd_rad_s: Floats  # (moment, joint)
     qdd_rad_s2: Floats  # (moment, joint)
+    jerk_rad_s3: Floats  # (moment, joint)
     torque_nm: Floats  # (moment, joint)
     still_rad_s: Floats  # (joint,)
     temperature_degC: Floats | None  # (moment, joint)
@@ -68,15 +70,31 @@ def motion_of(recording: Recording) -> Motion | None:
     if not np.isfinite(period_s) or period_s <= 0.0:
         return None
     band_hz = min(BAND_HZ, 1.0 / period_s / RATE_OVER_BAND)
-    torques, there = torque.track, np.full(n, -1)
+    torques = _on_clock_of(joints, torque)
+    if torques is None:
+        return None
+    there = np.full(n, -1)
     there[[torques.joint(k) - 1 for k in range(torques.channels)]] = np.arange(torques.channels)
     first = max(joints.track.time_s[0], torques.time_s[0])
     time_s = np.arange(first, min(joints.track.time_s[-1], torques.time_s[-1]), period_s)
     q_rad, torque_nm = joints.track.curve.at(time_s), torques.curve.at(time_s)[:, there]
     torque_nm[:, there < 0] = np.nan
     whole = np.all(np.isfinite(q_rad), axis=1) & np.all(np.isfinite(torque_nm[:, there >= 0]), axis=1)
-    runs = [_filtered(time_s[run], q_rad[run], torque_nm[run], band_hz, period_s) for run in _runs(whole, period_s)]
+    runs = [
+        _filtered(time_s[run], q_rad[run], torque_nm[run], band_hz, period_s) for run in _runs(whole, band_hz, period_s)
+    ]
     return _thinned(runs, recording, band_hz, period_s) if runs else None
+
+
+def _on_clock_of(joints: StreamDevice, torque: StreamDevice) -> Track | None:
+    """The torques; of another stream by the promptest arrivals. None where nothing shows how the clocks differ."""
+    if torque.sequence is joints.sequence:
+        return torque.track
+    between, time_s = start_between(joints, torque), torque.track.time_s
+    if between is None:
+        return None
+    shifted_s = time_s + between.offset_s + between.rate_error * (time_s - between.at_s)
+    return replace(torque.track, time_s=shifted_s)
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,14 +105,17 @@ class _Run:
     q_rad: Floats
     qd_rad_s: Floats
     qdd_rad_s2: Floats
+    jerk_rad_s3: Floats
     torque_nm: Floats
     noise_rad: Floats  # (joint,) of one reading of an angle
 
 
-def _runs(whole: Flags, period_s: float) -> list[NDArray[np.intp]]:
+def _runs(whole: Flags, band_hz: float, period_s: float) -> list[NDArray[np.intp]]:
+    """Stretches that are long enough for the low pass, and for something between its ends."""
     rows = np.flatnonzero(whole)
     parts = np.split(rows, 1 + np.flatnonzero(np.diff(rows) > 1))
-    return [part for part in parts if len(part) * period_s >= LEAST_RUN_S]
+    least = max(LEAST_RUN_S / period_s, 2 * round(EDGE_PERIODS / band_hz / period_s) + 3, 3 * (2 * ORDER + 1) + 1)
+    return [part for part in parts if len(part) >= least]
 
 
 def _filtered(time_s: Floats, q_rad: Floats, torque_nm: Floats, band_hz: float, period_s: float) -> _Run:
@@ -102,11 +123,13 @@ def _filtered(time_s: Floats, q_rad: Floats, torque_nm: Floats, band_hz: float, 
     speed = np.gradient(smooth, period_s, axis=0)
     noise = SIGMA_OF_MEDIAN * np.median(np.abs(q_rad - smooth), axis=0)
     acceleration, torque = np.gradient(speed, period_s, axis=0), torque_nm.copy()
+    jerk = np.gradient(acceleration, period_s, axis=0)
     measured = np.isfinite(torque_nm).all(axis=0)
     torque[:, measured] = _low_pass(torque_nm[:, measured], band_hz, period_s)
     edge = round(EDGE_PERIODS / band_hz / period_s)
     inside = slice(edge, len(time_s) - edge)
-    return _Run(time_s[inside], smooth[inside], speed[inside], acceleration[inside], torque[inside], noise)
+    moved = smooth[inside], speed[inside], acceleration[inside], jerk[inside]
+    return _Run(time_s[inside], *moved, torque[inside], noise)
 
 
 def _low_pass(values: Floats, band_hz: float, period_s: float) -> Floats:
@@ -123,11 +146,11 @@ def _thinned(runs: list[_Run], recording: Recording, band_hz: float, period_s: f
     still = np.maximum(STILL_SHARE * fastest, STILL_SIGMAS * speed * noise) + 1e-9
     step = max(1, round(0.5 / band_hz / period_s), -(-sum(len(run.time_s) for run in runs) // MOST_ROWS))
     parts = [_rows(run, still, round(0.5 / band_hz / period_s), step) for run in runs]
-    time_s, q, qd, qdd, torque = (np.concatenate(each) for each in zip(*parts, strict=True))
+    time_s, q, qd, qdd, jerk, torque = (np.concatenate(each) for each in zip(*parts, strict=True))
     if len(time_s) < FEWEST_ROWS or not np.isfinite(torque).any():
         return None
     heat = _temperatures(recording, time_s, q.shape[1])
-    return Motion(time_s, q, qd, qdd, torque, still, heat, band_hz, speed * noise, acceleration * noise)
+    return Motion(time_s, q, qd, qdd, jerk, torque, still, heat, band_hz, speed * noise, acceleration * noise)
 
 
 def _rows(run: _Run, still: Floats, window: int, step: int) -> tuple[Floats, ...]:
@@ -138,7 +161,8 @@ def _rows(run: _Run, still: Floats, window: int, step: int) -> tuple[Floats, ...
         steady[shift:] &= sense[shift:] == sense[:-shift]
         steady[:-shift] &= sense[:-shift] == sense[shift:]
     torque = np.where(steady, run.torque_nm, np.nan)
-    return tuple(part[::step] for part in (run.time_s, run.q_rad, run.qd_rad_s, run.qdd_rad_s2, torque))
+    moved = run.q_rad, run.qd_rad_s, run.qdd_rad_s2, run.jerk_rad_s3
+    return tuple(part[::step] for part in (run.time_s, *moved, torque))
 
 
 def _gains(band_hz: float, period_s: float) -> tuple[float, float]:

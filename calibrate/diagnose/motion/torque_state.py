@@ -221,7 +221,7 @@ def with_torque(drivers: MotionDrivers, links: Floats, terms: Sequence[Accepted]
     for a in terms:
         if a.term.physics in LOADS:
             torque = torque + a.at(drivers)
-    rate = np.gradient(torque, drivers.t_s, axis=0)
+    rate = (drivers.rate_columns @ carried).reshape(-1, n)  # of links and payload: rows stand too far apart for a slope
     extra = {**drivers.extra, **{f"tau{i + 1}": torque[:, i] for i in range(n)}}
     tilted = (drivers.lean_columns @ carried).reshape(-1, n, 2)
     return replace(drivers, torque_nm=torque, torque_rate_nm_s=rate, tilted=tilted, extra=extra)

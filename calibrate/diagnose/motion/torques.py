@@ -20,13 +20,17 @@ from calibrate.diagnose.motion.torque_state import TorqueState, with_torque
 from calibrate.diagnose.record.schema import TORQUE, DiagnosisFile, JointTorqueRecord, TorquesRecord
 from calibrate.diagnose.record.to_file import finding_record, unexplained_record
 from calibrate.model.arms.catalogue import arm_of
+from calibrate.model.arms.coupled_readings import by_reading
 from calibrate.model.arms.inverse_dynamics import torque_columns
+from calibrate.model.arms.serial import SerialArm
 from calibrate.model.effects.term import Accepted, Missing
 from calibrate.model.effects.torque import TORQUES, MotionDrivers, friction
 from calibrate.model.parameters import start_values
+from calibrate.model.rigid import cross_matrix
 
 Floats = NDArray[np.float64]
 
+RATE_STEP_S = 1e-4  # of the difference quotient by time
 JUDGED = "last block"  # the split that a motion is judged by: single moments are half known by their neighbours
 
 
@@ -47,8 +51,11 @@ class TorqueDiagnosis:
 
 
 def diagnose_torques(recording: Recording, rng: Generator) -> TorqueDiagnosis | None:
-    """None where the recording holds no torques beside joint angles, or too few of them in motion."""
-    motion = motion_of(recording)
+    """None where the recording holds no torques beside joint angles, or too few of them in motion; and of an arm with a
+    joint that follows another one.
+    """
+    coupled = by_reading(recording.rig.arm) is not None  # torques of such drives are shared out between two joints
+    motion = None if coupled else motion_of(recording)
     if motion is None:
         return None
     bare = torque_state(recording.rig, motion)
@@ -97,14 +104,9 @@ def torque_state(rig: Rig, motion: Motion) -> TorqueState:
 def _drivers(rig: Rig, motion: Motion) -> MotionDrivers:
     arm = arm_of(rig)
     frames = arm.frames(start_values(arm.parameters), motion.q_rad)
-    gravity = np.array(rig.arm.gravity_m_s2)
     qd, qdd, none = motion.qd_rad_s, motion.qdd_rad_s2, np.zeros_like(motion.qd_rad_s)
-    columns = torque_columns(frames, qd, qdd, gravity)
-    lean = [torque_columns(frames, none, none, np.cross(axis, gravity)) for axis in np.eye(3)[:2]]
-    rows, n = qd.shape
-    rotors = qdd[:, :, None] * np.eye(n)
-    each = range(1, n + 1)
-    heat = motion.temperature_degC
+    columns, of_rate, of_lean = _link_columns(arm, frames, motion, np.array(rig.arm.gravity_m_s2))
+    each, heat = range(1, rig.n_joints + 1), motion.temperature_degC
     plain = MotionDrivers(
         rig=rig,
         q_rad=motion.q_rad,
@@ -126,16 +128,36 @@ def _drivers(rig: Rig, motion: Motion) -> MotionDrivers:
         qdd_rad_s2=qdd,
         torque_nm=none,
         torque_rate_nm_s=none,
-        link_columns=np.concatenate([columns.reshape(rows * n, -1), rotors.reshape(rows * n, n)], axis=1),
-        lean_columns=np.concatenate(
-            [np.stack(lean, axis=2).reshape(rows * n * 2, -1), np.zeros((rows * n * 2, n))], axis=1
-        ),
+        link_columns=_with_rotors(columns, qdd),
+        rate_columns=_with_rotors(of_rate, motion.jerk_rad_s3),
+        lean_columns=_with_rotors(of_lean, none),
         last_link=columns[:, :, -1, :4],
-        tilted=np.zeros((rows, n, 2)),
+        tilted=np.zeros((*qd.shape, 2)),
         still_rad_s=motion.still_rad_s,
         temperature_degC=heat,
     )
     return with_torque(plain, start_values(link_parameters(rig)))
+
+
+def _link_columns(arm: SerialArm, frames: Floats, motion: Motion, gravity: Floats) -> tuple[Floats, Floats, Floats]:
+    """(moment, joint, link, 10) torques, their derivative by time, and (moment, joint, 2, link, 10) by a lean."""
+    q, qd, qdd, jerk = motion.q_rad, motion.qd_rad_s, motion.qdd_rad_s2, motion.jerk_rad_s3
+    theta, still = start_values(arm.parameters), np.zeros_like(qd)
+    ahead, back = (
+        torque_columns(arm.frames(theta, q + h * qd), qd + h * qdd, qdd + h * jerk, gravity)
+        for h in (RATE_STEP_S, -RATE_STEP_S)
+    )
+    lean = [torque_columns(frames, still, still, cross_matrix(axis) @ gravity) for axis in np.eye(3)[:2]]
+    columns = torque_columns(frames, qd, qdd, gravity)
+    return columns, (ahead - back) / (2.0 * RATE_STEP_S), np.stack(lean, axis=2)
+
+
+def _with_rotors(links: Floats, by_rotor: Floats) -> Floats:
+    """(torque, link number) of links (moment, joint, ..., link, 10); each rotor turns its own joint (moment, joint)."""
+    n = by_rotor.shape[1]
+    own = by_rotor[:, :, None] * np.eye(n)
+    own = own if links.ndim == 4 else np.repeat(own[:, :, None], links.shape[2], axis=2)
+    return np.concatenate([links.reshape(own.size // n, -1), own.reshape(-1, n)], axis=1)
 
 
 def with_torques(file: DiagnosisFile, found: TorqueDiagnosis | None) -> DiagnosisFile:

@@ -279,6 +279,11 @@ class DiagnosisFile(Record, frozen=True):
     torques: TorquesRecord | None = None  # of a recording in motion
 
 
+def of_poses(file: DiagnosisFile) -> tuple[FindingRecord, ...]:
+    """The findings that a verdict on settled poses counts: what a drive takes is none. All of a recording without."""
+    return tuple(one for one in file.findings if one.stream != TORQUE) if file.samples else file.findings
+
+
 def no_better_with_physics(file: DiagnosisFile) -> str:
     """Why a model with the physics does not replace one of geometry alone; empty where it does.
 

@@ -13,6 +13,7 @@ from calibrate.diagnose.record.schema import (
     SmallestRecord,
     SplitRecord,
     UnexplainedRecord,
+    of_poses,
 )
 from calibrate.model.effects.term import UNITS
 from calibrate.quantities import TIED, counted, length
@@ -50,7 +51,7 @@ def verdict_words(file: DiagnosisFile) -> str:
         case "consistent" if file.known is not None:
             return f"Nothing new: recording and model agree to within {_noise(file)}{_tested(file)}."
         case "mismatch":
-            found = counted(len(file.findings), "cause")
+            found = counted(len(of_poses(file)), "cause")
             return f"Recording and model disagree: {found} found{_how_far(file)}."
         case "consistent":
             return f"Recording and model agree: what remains is {_noise(file)}{_tested(file)}."

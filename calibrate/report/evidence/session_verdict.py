@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import fdtrc
 
-from calibrate.diagnose.record.schema import TORQUE, DiagnosisFile, SplitRecord, no_better_with_physics
+from calibrate.diagnose.record.schema import DiagnosisFile, SplitRecord, no_better_with_physics, of_poses
 from calibrate.fit.accuracy import Alarm, checks_nothing
 from calibrate.fit.solvers import Status
 from calibrate.model.model_file import Fields, ModelFile, UnseenRows
@@ -215,7 +215,7 @@ def _reasons_of_diagnosis(found: DiagnosisFile | None, model: ModelFile) -> Iter
     if found is None or found.verdict == "consistent" or (found.verdict == "mismatch" and model.session):
         return
     if found.verdict == "mismatch":
-        causes = counted(sum(one.stream != TORQUE for one in found.findings), "cause")
+        causes = counted(len(of_poses(found)), "cause")
         no_better = no_better_with_physics(found) if found.findings else ""
         yield (
             f"Geometry alone does not explain the readings: the diagnosis found {causes}"

@@ -116,6 +116,14 @@ def test_time_goes_on_over_the_minute_through_bursts_and_silences() -> None:
     assert times_s == pytest.approx([59.998, 60.002, 60.001, 60.102, 90.102, 90.105, 390.1], abs=1e-6)
 
 
+def test_an_adapter_that_lost_its_power_does_not_turn_time_back() -> None:
+    clock = MinuteClock()
+    first_s = clock.follow(30_000, 1000.0)
+    clock.opened()
+    times_s = [clock.follow(stamp_ms, 1000.0 + late_s) - first_s for stamp_ms, late_s in ((0, 3.0), (500, 3.5))]
+    assert times_s == pytest.approx([3.0, 3.5], abs=1e-3)
+
+
 def test_time_goes_on_when_the_adapter_is_opened_again() -> None:
     adapter = StampingAdapter()
     open_bus = bus_opener("slcan", adapter.channel, 1_000_000, stamped=True)

@@ -214,6 +214,22 @@ def test_a_stop_ends_freedrive_once(child) -> None:
     assert child.notes.done == ["freedrive", "freedrive ends", "stop", "stop"]
 
 
+def test_a_freedrive_that_does_not_end_is_tried_again_and_the_arm_brakes_all_the_same(child) -> None:
+    child.calls.send(Call(1, Freedrive(True)))
+    child.turn()
+
+    def failing() -> bool:
+        child.notes.done.append("does not end")
+        raise RuntimeError("RTDE control script is not running")
+
+    child.notes.endFreedriveMode = failing
+    child.calls.send(Call(2, Freedrive(False)))
+    child.turn()
+    child.stops.send(Stop(2.0, 2))
+    child.turn()
+    assert child.notes.done == ["freedrive", "does not end", "does not end", "stop"]
+
+
 def test_freedrive_ends_where_the_parent_beats_no_more(child) -> None:
     child.calls.send(Call(1, Freedrive(True)))
     child.turn()

@@ -23,6 +23,7 @@ class MotionDrivers(Drivers):
     torque_nm: Floats  # (moment, joint) of the rigid links
     torque_rate_nm_s: Floats  # (moment, joint) its derivative by time
     link_columns: Floats  # (moment * joint, link number) torque for one unit of each number of each link
+    rate_columns: Floats  # (moment * joint, link number) the same of its derivative by time
     lean_columns: Floats  # (moment * joint * 2, link number) its change for one radian that gravity leans about x, y
     last_link: Floats  # (moment, joint, 4) torque for one kg and one kg m along x, y, z of the flange
     tilted: Floats  # (moment, joint, 2) torque for one radian by which gravity leans about x, y of the base

@@ -1,8 +1,12 @@
 """Which torque was left out: each mechanism of an arm in motion by its name, its joint and its size."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from msgspec import structs
 
+from acquisition.recording.rig.schema import Follows
 from benchmarks.drawn_motion import Hidden, recorded
 from calibrate.diagnose.assess.diagnosis import Verdict
 from calibrate.diagnose.motion import diagnose_torques
@@ -75,3 +79,45 @@ def test_standing_joints_show_no_torque():
     values = recording.streams["robot"].values
     values["actual_q_rad"][:] = values["actual_q_rad"][0]
     assert diagnose_torques(recording, np.random.default_rng(1)) is None
+
+
+def test_a_slow_log_in_short_pieces_shows_nothing_and_raises_nothing():
+    recording = recorded(Hidden(), length_s=4.0)
+    stream = recording.streams["robot"]
+    for rows in (np.arange(0, 600, 50), np.arange(0, 1800, 50), np.arange(0, 1)):
+        few = replace(
+            stream,
+            host_s=stream.host_s[rows],
+            device_s=stream.device_s[rows],
+            sequence=stream.sequence[rows],
+            values={name: values[rows] for name, values in stream.values.items()},
+        )
+        assert diagnose_torques(replace(recording, streams={"robot": few}), np.random.default_rng(1)) is None
+
+
+def test_torques_of_another_device_are_brought_to_the_clock_of_the_joints():
+    recording = recorded(Hidden(coulomb={3: 2.0}))
+    stream = recording.streams["robot"]
+    joints, torque = (replace(stream, channels=stream.channels[k : k + 1]) for k in (0, 1))
+    joints = replace(joints, values={"actual_q_rad": stream.values["actual_q_rad"]})
+    values = {"joint_torque_nm": stream.values["joint_torque_nm"]}
+    torque = replace(torque, values=values, sequence=stream.sequence.copy(), device_s=stream.device_s + 0.5)
+    both = replace(recording, streams={"robot": joints, "drives": torque})
+    found = diagnose_torques(both, np.random.default_rng(1))
+    assert found is not None
+    assert [f.name.physics for f in found.diagnosis.findings if f.share > 0.01] == ["coulomb-friction"]
+
+
+def test_an_arm_whose_joint_follows_another_one_is_left_alone():
+    recording = recorded(Hidden())
+    joints = list(recording.rig.arm.joints)
+    joints[2] = structs.replace(joints[2], follows=Follows(2, -1.0))
+    rig = structs.replace(recording.rig, arm=structs.replace(recording.rig.arm, joints=tuple(joints)))
+    assert diagnose_torques(replace(recording, rig=rig), np.random.default_rng(1)) is None
+
+
+@pytest.mark.endure
+def test_a_delay_is_found_in_a_long_motion_too():
+    (found,) = diagnosed(Hidden(delay={2: 0.01}), length_s=120.0).findings
+    assert found.name.physics == "torque-delay"
+    assert found.parameters["delay_s"].value == pytest.approx(0.01, rel=OF_ITS_SIZE)
