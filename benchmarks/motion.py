@@ -17,9 +17,10 @@ from numpy.typing import NDArray
 
 from acquisition.recording import Recording, read
 from calibeam.cli import run
+from calibrate.diagnose.motion.links_alone import torque_state
 from calibrate.diagnose.motion.motion_table import motion_of
 from calibrate.diagnose.motion.torque_state import TorqueState, with_torque
-from calibrate.diagnose.motion.torques import TorqueDiagnosis, diagnose_torques, torque_state, usual_friction
+from calibrate.diagnose.motion.torques import TorqueDiagnosis, diagnose_torques, usual_friction
 
 Floats = NDArray[np.float64]
 
@@ -75,7 +76,7 @@ def diagnosed(recording: Recording) -> TorqueDiagnosis:
 def left_nm(model: TorqueState, other: Recording) -> tuple[Floats, Floats]:
     """Of each joint of a recording that the model has not seen: rms of its torque, and of what the model leaves."""
     unseen = seen_as_links(other).whole
-    drivers = with_torque(unseen.drivers, model.links)
+    drivers = with_torque(unseen.drivers, model.links, model.accepted)
     problem = replace(unseen, terms=model.problem.terms, sizes=model.problem.sizes, drivers=drivers)
     return _rms(problem.joint, problem.observed_nm), _rms(problem.joint, problem.misfit_nm(model.theta))
 

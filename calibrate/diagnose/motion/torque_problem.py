@@ -16,6 +16,7 @@ from calibrate.model.arms.inverse_dynamics import NUMBERS, UNITS
 from calibrate.model.effects.term import Accepted
 from calibrate.model.effects.torque import MotionDrivers
 from calibrate.model.parameters import Parameter
+from calibrate.model.torque_records import TorquesOfModel
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
@@ -29,8 +30,10 @@ WIDE = 1e3  # kg, kg m, kg m²: a link of a robot for heavy loads
 LOOSE = 1e3  # times the size that would be plain to see: prior about a coefficient, so that none is ever singular
 
 
-def link_parameters(rig: Rig) -> tuple[Parameter, ...]:
-    """Ten for each link, link by link, about what the rig file states; then the rotor of each joint."""
+def link_parameters(rig: Rig, known: TorquesOfModel | None = None) -> tuple[Parameter, ...]:
+    """Ten for each link, link by link, about what the rig file states, or a model or simulation beside it; then the
+    rotor of each joint.
+    """
     out: list[Parameter] = []
     stated = rig.tolerance
     share = MASS_SHARE if stated is None or stated.mass_share is None else stated.mass_share
@@ -40,23 +43,26 @@ def link_parameters(rig: Rig) -> tuple[Parameter, ...]:
         bodies = [(joint.mass_kg, joint.com_m, joint.inertia_kg_m2)]
         if i == last and rig.tool.mass_kg is not None:
             bodies.append((rig.tool.mass_kg, rig.tool.com_m, None))
-        if joint.mass_kg is None:
+        if joint.mass_kg is None and known is None:
             start, sigma = np.zeros(len(NUMBERS)), np.full(len(NUMBERS), WIDE)
         else:
             length_m = max(LEAST_LENGTH_M, float(np.hypot(joint.a_m or 0.0, joint.d_m or 0.0)))
             start = np.sum([_body(mass or 0.0, *rest) for mass, *rest in bodies], axis=0)
-            mass_kg = max(start[0], 1e-3)
+            start = start if known is None else np.array(known.links[i])
+            mass_kg = max(float(start[0]), 1e-3)
             first = mass_kg * centre_m + share * np.abs(start[1:4])
             spread = UNSTATED_SHARE * mass_kg * length_m**2
-            if joint.inertia_kg_m2 is not None:
+            if known is not None:
+                spread = INERTIA_SHARE * max(*start[4:7], 1e-6)
+            elif joint.inertia_kg_m2 is not None:
                 spread = INERTIA_SHARE * max(*joint.inertia_kg_m2[:3], 1e-6)
             sigma = np.array([share * mass_kg, *first, *(spread,) * 6])
         out += [
             Parameter(f"link{i + 1}.{name}", unit, float(s), start=float(at), prior=float(s))
             for name, unit, at, s in zip(NUMBERS, UNITS, start, sigma, strict=True)
         ]
-    rotors = (_rotor(i, joint.rotor_inertia_kg_m2) for i, joint in enumerate(rig.arm.joints, start=1))
-    return (*out, *rotors)
+    stated_rotors = [j.rotor_inertia_kg_m2 for j in rig.arm.joints] if known is None else known.rotors_kg_m2
+    return (*out, *(_rotor(i, one) for i, one in enumerate(stated_rotors, start=1)))
 
 
 def _rotor(joint: int, stated_kg_m2: float | None) -> Parameter:
@@ -90,6 +96,7 @@ class TorqueProblem:
     terms: tuple[Accepted, ...]
     sizes: tuple[Floats, ...]  # of each term (coefficient,) plain to see; inf where it does nothing
     drivers: MotionDrivers
+    given: tuple[Accepted, ...] = ()  # known before: part of what is expected, not fitted
 
     @cached_property
     def before(self) -> Ints:
@@ -165,7 +172,7 @@ class TorqueProblem:
         """(datum,) expected less observed."""
         links, terms = self.split(theta)
         out = self.columns @ links - self.observed_nm
-        for accepted in terms:
+        for accepted in (*self.given, *terms):
             out = out + self.felt(accepted.at(self.drivers))
         return out
 

@@ -114,7 +114,7 @@ class TorqueState:
 
     def renewed(self) -> "TorqueState":
         """With the load as now fitted."""
-        drivers = with_torque(self.drivers, self.links, self.accepted)
+        drivers = with_torque(self.drivers, self.links, (*self.problem.given, *self.accepted))
         whole, problem = replace(self.whole, drivers=drivers), replace(self.problem, drivers=drivers)
         return _settled(replace(self, whole=whole), problem, self.theta)
 

@@ -128,9 +128,9 @@ def _cold(drivers: Drivers) -> tuple[Term, ...]:
 
 
 def _warmth(drivers: MotionDrivers) -> Floats:
-    """(moment, joint) K above the mean of the motion."""
-    heat = drivers.temperature_degC
-    return np.zeros_like(drivers.qd) if heat is None else heat - heat.mean(axis=0)
+    """(moment, joint) K above the reference."""
+    heat, reference = drivers.temperature_degC, drivers.reference_degC
+    return np.zeros_like(drivers.qd) if heat is None or reference is None else heat - reference
 
 
 def _run_in(drivers: Drivers) -> tuple[Term, ...]:

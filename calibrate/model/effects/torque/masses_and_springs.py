@@ -72,7 +72,7 @@ def _gravity(drivers: Drivers) -> tuple[Term, ...]:
 
 def _spring(drivers: Drivers) -> tuple[Term, ...]:
     def law(i: int) -> Law:
-        return lambda d, inner: np.stack([d.q_rad[:, i - 1] - d.q_rad[:, i - 1].mean(), np.ones(len(d.t_s))], axis=1)
+        return lambda d, inner: np.stack([d.q_rad[:, i - 1] - d.middle_rad[i - 1], np.ones(len(d.t_s))], axis=1)
 
     return tuple(
         at_torque(

@@ -28,7 +28,9 @@ class MotionDrivers(Drivers):
     last_link: Floats  # (moment, joint, 4) torque for one kg and one kg m along x, y, z of the flange
     tilted: Floats  # (moment, joint, 2) torque for one radian by which gravity leans about x, y of the base
     still_rad_s: Floats  # (joint,) below this speed it is open which way a joint turns
+    middle_rad: Floats  # (joint,) what the way of a spring is counted from
     temperature_degC: Floats | None = None  # (moment, joint)
+    reference_degC: Floats | None = None  # (joint,) what friction by temperature is counted from
 
     @property
     def clock_is_a_cause(self) -> bool:

@@ -1,0 +1,118 @@
+"""A motion as rigid links feel it: what drives each term at every moment, and the links alone fitted to its torques."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition.recording.rig import Rig
+from calibrate.diagnose.motion.known_torques import listed_torques
+from calibrate.diagnose.motion.motion_table import Motion
+from calibrate.diagnose.motion.torque_problem import TorqueProblem, link_parameters
+from calibrate.diagnose.motion.torque_state import TorqueState, with_torque
+from calibrate.model.arms.catalogue import arm_of
+from calibrate.model.arms.inverse_dynamics import torque_columns
+from calibrate.model.arms.serial import SerialArm
+from calibrate.model.effects.torque import MotionDrivers
+from calibrate.model.parameters import start_values
+from calibrate.model.rigid import cross_matrix
+from calibrate.model.torque_records import TorquesOfModel
+
+Floats = NDArray[np.float64]
+
+RATE_STEP_S = 1e-4  # of the difference quotient by time
+
+
+def torque_state(rig: Rig, motion: Motion, known: TorquesOfModel | None = None) -> TorqueState:
+    """The links alone, fitted; beside what a model or a simulation knows."""
+    drivers, links = motion_drivers(rig, motion, known), link_parameters(rig, known)
+    given = () if known is None else listed_torques(known.effects, drivers)
+    moment, joint = (part.astype(np.intp) for part in np.nonzero(np.isfinite(motion.torque_nm)))
+    order = np.lexsort((moment, joint))
+    moment, joint = moment[order], joint[order]
+    observed = motion.torque_nm[moment, joint]
+    columns = drivers.link_columns.reshape(*motion.q_rad.shape, -1)[moment, joint]
+    spread = np.array(
+        [max(float(np.std(observed[joint == j])), 1e-9) if np.any(joint == j) else 1.0 for j in range(rig.n_joints)]
+    )
+    whole = TorqueProblem(
+        links,
+        columns,
+        observed,
+        moment,
+        joint,
+        spread,
+        np.full(rig.n_joints, 1e-3),
+        np.ones(len(moment)),
+        (),
+        (),
+        with_torque(drivers, start_values(links), given),
+        given,
+    )
+    start, everything = start_values(links), np.arange(len(motion.time_s))
+    first = TorqueState(whole, everything, whole, start, np.inf)
+    return first.refitted(()).renewed()
+
+
+def motion_drivers(rig: Rig, motion: Motion, known: TorquesOfModel | None = None) -> MotionDrivers:
+    """Without any load yet."""
+    arm, gravity = arm_of(rig), np.array(rig.arm.gravity_m_s2 if known is None else known.gravity_m_s2)
+    frames = arm.frames(start_values(arm.parameters), motion.q_rad)
+    qd, qdd, none = motion.qd_rad_s, motion.qdd_rad_s2, np.zeros_like(motion.qd_rad_s)
+    columns, of_rate, of_lean = _link_columns(arm, frames, motion, gravity)
+    each, heat = range(1, rig.n_joints + 1), motion.temperature_degC
+    middle_rad, reference = motion.q_rad.mean(axis=0), None if heat is None else heat.mean(axis=0)
+    if known is not None and known.middle_rad:
+        middle_rad = np.array(known.middle_rad)
+    if known is not None and known.reference_degC and heat is not None:
+        reference = np.array(known.reference_degC)
+    return MotionDrivers(
+        rig=rig,
+        q_rad=motion.q_rad,
+        t_s=motion.time_s,
+        frames=frames,
+        readouts={},
+        approach=None,
+        approach_derived=False,
+        last_move_rad=none,
+        qd_rad_s=qd,
+        cmd_minus_q_rad=None,
+        temperatures_degC={} if heat is None else {f"joint{i}": heat[:, i - 1] for i in each},
+        payload_kg=None,
+        payload_com_m=None,
+        psd_sum_v=None,
+        extra={f"qdd{i}": qdd[:, i - 1] for i in each},
+        repeat=None,
+        qd=qd,
+        qdd_rad_s2=qdd,
+        torque_nm=none,
+        torque_rate_nm_s=none,
+        link_columns=_with_rotors(columns, qdd),
+        rate_columns=_with_rotors(of_rate, motion.jerk_rad_s3),
+        lean_columns=_with_rotors(of_lean, none),
+        last_link=columns[:, :, -1, :4],
+        tilted=np.zeros((*qd.shape, 2)),
+        still_rad_s=motion.still_rad_s,
+        middle_rad=middle_rad,
+        temperature_degC=heat,
+        reference_degC=reference,
+    )
+
+
+def _link_columns(arm: SerialArm, frames: Floats, motion: Motion, gravity: Floats) -> tuple[Floats, Floats, Floats]:
+    """(moment, joint, link, 10) torques, their derivative by time, and (moment, joint, 2, link, 10) by a lean."""
+    q, qd, qdd, jerk = motion.q_rad, motion.qd_rad_s, motion.qdd_rad_s2, motion.jerk_rad_s3
+    theta, still = start_values(arm.parameters), np.zeros_like(qd)
+    ahead, back = (
+        torque_columns(arm.frames(theta, q + h * qd), qd + h * qdd, qdd + h * jerk, gravity)
+        for h in (RATE_STEP_S, -RATE_STEP_S)
+    )
+    lean = [torque_columns(frames, still, still, cross_matrix(axis) @ gravity) for axis in np.eye(3)[:2]]
+    columns = torque_columns(frames, qd, qdd, gravity)
+    return columns, (ahead - back) / (2.0 * RATE_STEP_S), np.stack(lean, axis=2)
+
+
+def _with_rotors(links: Floats, by_rotor: Floats) -> Floats:
+    """(torque, link number) of links (moment, joint, ..., link, 10); each rotor turns its own joint (moment, joint)."""
+    n = by_rotor.shape[1]
+    own = by_rotor[:, :, None] * np.eye(n)
+    own = own if links.ndim == 4 else np.repeat(own[:, :, None], links.shape[2], axis=2)
+    return np.concatenate([links.reshape(own.size // n, -1), own.reshape(-1, n)], axis=1)
