@@ -96,7 +96,7 @@ def least_squares(recording: Recording) -> TorqueState:
     problem = full.problem
     scale = 1.0 / _rms(problem.joint, problem.observed_nm)[problem.joint]
     terms = [problem.felt(a.term.basis(problem.drivers, a.inner)) for a in full.accepted]
-    columns = np.concatenate([problem.columns, *terms], axis=1) * scale[:, None]
+    columns = np.concatenate([problem.columns @ problem.links.ways, *terms], axis=1) * scale[:, None]
     size = np.maximum(np.linalg.norm(columns, axis=0), 1e-12)
     theta = np.linalg.lstsq(columns / size, problem.observed_nm * scale, rcond=1e-9)[0] / size
     return replace(full, theta=theta)

@@ -32,6 +32,7 @@ from calibrate.model.effect_records import EffectRecord, SessionRecord, check_ph
 from calibrate.model.older_models import with_present_names
 from calibrate.model.parameters import Parameter
 from calibrate.model.sensors.catalogue import BY_NAME, FRAMES
+from calibrate.model.torque_records import TorquesOfModel
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
@@ -202,6 +203,7 @@ class ModelFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     session: SessionRecord | None = None
     measured_sha256: Label | None = None  # and which measurements; absent in models of earlier versions
     left_m: Statistic | None = None  # of a coordinate of the target, what unseen rows show beyond its sigma
+    torques: TorquesOfModel | None = None  # of a recording in motion
     dh_table: Many[ModelParameter] = ()  # of an arm that was fitted as poses: corrections of its standard D-H table
 
     def made_of(self, samples: Samples) -> bool | None:

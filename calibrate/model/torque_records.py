@@ -31,6 +31,7 @@ class TorquesOfModel(StrictRecord, frozen=True):
     reference_degC: Many[Number] = ()  # of each joint: what friction by temperature is counted from
     noise_nm: Many[Statistic] = ()  # of each joint: one sigma; of none: not known
     moments: Count = 0
+    triangle: Many[Many[Number]] = ()  # (row, link number) what the motion shows of the links, noise 1; of a fit
     notes: Many[Sentence] = ()
 
     def __post_init__(self) -> None:

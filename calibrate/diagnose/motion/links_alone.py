@@ -5,8 +5,9 @@ from numpy.typing import NDArray
 
 from acquisition.recording.rig import Rig
 from calibrate.diagnose.motion.known_torques import listed_torques
+from calibrate.diagnose.motion.link_prior import link_prior
 from calibrate.diagnose.motion.motion_table import Motion
-from calibrate.diagnose.motion.torque_problem import TorqueProblem, link_parameters
+from calibrate.diagnose.motion.torque_problem import TorqueProblem
 from calibrate.diagnose.motion.torque_state import TorqueState, with_torque
 from calibrate.model.arms.catalogue import arm_of
 from calibrate.model.arms.inverse_dynamics import torque_columns
@@ -23,7 +24,7 @@ RATE_STEP_S = 1e-4  # of the difference quotient by time
 
 def torque_state(rig: Rig, motion: Motion, known: TorquesOfModel | None = None) -> TorqueState:
     """The links alone, fitted; beside what a model or a simulation knows."""
-    drivers, links = motion_drivers(rig, motion, known), link_parameters(rig, known)
+    drivers, links = motion_drivers(rig, motion, known), link_prior(rig, known)
     given = () if known is None else listed_torques(known.effects, drivers)
     moment, joint = (part.astype(np.intp) for part in np.nonzero(np.isfinite(motion.torque_nm)))
     order = np.lexsort((moment, joint))
@@ -44,10 +45,10 @@ def torque_state(rig: Rig, motion: Motion, known: TorquesOfModel | None = None) 
         np.ones(len(moment)),
         (),
         (),
-        with_torque(drivers, start_values(links), given),
+        with_torque(drivers, links.stated, given),
         given,
     )
-    start, everything = start_values(links), np.arange(len(motion.time_s))
+    start, everything = np.zeros(links.size), np.arange(len(motion.time_s))
     first = TorqueState(whole, everything, whole, start, np.inf)
     return first.refitted(()).renewed()
 

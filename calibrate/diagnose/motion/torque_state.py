@@ -110,7 +110,7 @@ class TorqueState:
         terms = tuple(accepted)
         problem = replace(self.problem, terms=terms, sizes=plain_sizes(self.problem, terms))
         values = [a.values for a in terms]
-        return _settled(self, problem, np.concatenate([self.links, *values]))
+        return _settled(self, problem, np.concatenate([self.theta[: problem.links.size], *values]))
 
     def renewed(self) -> "TorqueState":
         """With the load as now fitted."""
@@ -149,7 +149,7 @@ def _settled(state: TorqueState, problem: TorqueProblem, start: Floats) -> Torqu
         theta = fit.theta
         problem, value = with_noise(problem, theta)
         away = (theta - start_values(problem.parameters)) / priors(problem.parameters)
-        value += float(away[: len(problem.links)] @ away[: len(problem.links)])
+        value += float(away[: problem.links.size] @ away[: problem.links.size])
         out = replace(state, problem=problem, theta=theta, minus_two_log_likelihood=value)
         if abs(last - value) < limits.SETTLED:
             break
@@ -195,12 +195,18 @@ def _memory_s(problem: TorqueProblem, misfit: Floats, joint: int) -> float:
 
 def _freedom(problem: TorqueProblem, theta: Floats) -> Floats:
     """(joint,) data over data less what was fitted to them: the trace of its part of the hat matrix."""
-    unit, sigma = plausible_sizes(problem.parameters), priors(problem.parameters)
-    slope = problem.jacobian(theta) * unit
-    inverse = np.linalg.pinv(slope.T @ slope + np.diag((unit / sigma) ** 2), hermitian=True)
-    leverage, n = np.sum((slope @ inverse) * slope, axis=1), problem.drivers.n_joints
+    slope, n = problem.jacobian(theta), problem.drivers.n_joints
+    leverage = np.sum((slope @ covariance_of(problem, slope)) * slope, axis=1)
     count, fitted = np.bincount(problem.joint, minlength=n), np.bincount(problem.joint, leverage, minlength=n)
     return np.asarray(count / np.maximum(count - fitted, limits.MOST_FITTED * np.maximum(count, 1)))
+
+
+def covariance_of(problem: TorqueProblem, slope: Floats) -> Floats:
+    """(parameter, parameter) posterior for the derivatives (datum, parameter) of the whitened residual."""
+    unit, sigma = plausible_sizes(problem.parameters), priors(problem.parameters)
+    scaled = slope * unit
+    inverse = np.linalg.pinv(scaled.T @ scaled + np.diag((unit / sigma) ** 2), hermitian=True)
+    return np.asarray(unit[:, None] * inverse * unit)
 
 
 def _likelihood(problem: TorqueProblem, misfit: Floats) -> tuple[float, Floats]:

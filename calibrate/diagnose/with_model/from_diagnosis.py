@@ -16,8 +16,7 @@ from acquisition.recording.rig import ArmModel, rig_sha256
 from acquisition.recording.samples import measured_sha256
 from calibrate.apply.export import dh_table_of
 from calibrate.apply.predicting import as_fitted
-from calibrate.diagnose.assess.diagnosis import UNKNOWN, Diagnosis, Finding
-from calibrate.diagnose.assess.findings import named
+from calibrate.diagnose.assess.diagnosis import Diagnosis, Finding
 from calibrate.diagnose.from_recording import Diagnosed
 from calibrate.diagnose.gross_errors import Cleared
 from calibrate.diagnose.search.bench import Bench
@@ -25,6 +24,7 @@ from calibrate.diagnose.search.noise_law import curvature_of
 from calibrate.diagnose.search.stated_sizes import sizes_of
 from calibrate.diagnose.state.fitted import Fitted
 from calibrate.diagnose.state.noise_of_fit import freedom
+from calibrate.diagnose.with_model.effect_of_term import effect_names, effect_of_term, finding_of, number_or_none
 from calibrate.errors import DataError
 from calibrate.fit.accuracy import against_stated
 from calibrate.fit.fit_plan import LossName, SolverName
@@ -38,18 +38,12 @@ from calibrate.fit.rank import Identifiability, analyse
 from calibrate.fit.solvers import Status, Stop
 from calibrate.fit.weighting import JOINT, Weighting
 from calibrate.model.effect_records import (
-    EffectCurve,
-    EffectParameter,
     EffectRecord,
     SessionRecord,
 )
-from calibrate.model.effects.catalogue import holds_of
-from calibrate.model.effects.curve import SmoothCurve
-from calibrate.model.effects.drivers import Drivers
 from calibrate.model.effects.fixture_moved import CARRIED
-from calibrate.model.effects.ports import Perturbation, Place
-from calibrate.model.effects.second_encoders import SECOND
-from calibrate.model.effects.term import Accepted, Shape, Size
+from calibrate.model.effects.ports import Perturbation
+from calibrate.model.effects.term import Shape
 from calibrate.model.effects.time_laws import FOR_A_WHILE
 from calibrate.model.model_file import (
     WITH_PHYSICS,
@@ -70,9 +64,8 @@ from calibrate.model.parameters import (
 from calibrate.model.predict import Predictor
 from calibrate.model.problem import whitener_of
 from calibrate.model.sensors.catalogue import kind_of
-from calibrate.model.sensors.encoder_difference import NAME as ENCODER_DIFFERENCE
 from calibrate.model.sensors.kind import Trait
-from calibrate.model.with_effects.acting import drivers_under, listed, range_of
+from calibrate.model.with_effects.acting import drivers_under, listed
 from calibrate.model.with_effects.applied import kept_conditions, needed_columns, recorded_conditions
 from calibrate.model.with_effects.new_poses import NEARLY, alike
 
@@ -86,8 +79,6 @@ LEAST_VARIANCE = 1e-6  # of the assumed one, of a source that is not there
 SAME_VARIANCE = 1e-3  # of itself, 0.05 % of a sigma
 TURNS = 30
 AXES = 3  # of a position
-KNOTS = 33  # of a curve: a wave of the finest of eight eigenfunctions has eight of them
-UNITS = ("rad_nm", "per_k", "rad", "m", "s", "nm", "share", "k")
 
 
 def model_of_diagnosis(found: Diagnosed, recording: Recording) -> ModelFile:
@@ -123,7 +114,7 @@ def model_of_fit(
 ) -> ModelFile:
     """Geometry and effects fitted together; `before`: geometry alone; `says`: if it converged. DataError as above."""
     fit = replace(fit, problem=replace(fit.problem, given=0))
-    names = _names(fit.accepted)
+    names = effect_names(fit.accepted)
     parameters, covariance = _parameters(fit, names), _covariance(fit)
     seen = _seen(fit, names)
     (conditions, needs), (noise, alarms) = _conditions(fit), _noise(fit, seen.rank)
@@ -164,7 +155,7 @@ def model_of_fit(
             first_t_s=float(fit.drivers.t_s.min()),
             last_t_s=float(fit.drivers.t_s.max()),
             readings_sha256=readings_sha256(recording.samples),
-            conditions={c: tuple(map(_number, v.tolist())) for c, v in conditions.items()},
+            conditions={c: tuple(map(number_or_none, v.tolist())) for c, v in conditions.items()},
         ),
     )
     model = _as_listed(model, fit, parameters, covariance, conditions)
@@ -196,22 +187,9 @@ def _fit_record(fit: Fitted) -> FitRecord:
         fit.steps,
         fit.stop.name,
         fit.stop.value,
-        _number(value),
+        number_or_none(value),
         LossName.STUDENT_T.value,
     )
-
-
-def _names(accepted: tuple[Accepted, ...]) -> tuple[str, ...]:
-    """Unique: "joint2-compliance", "base-moved", "base-moved-2"."""
-    out: list[str] = []
-    for a in accepted:
-        place = a.term.port.where.split(".")[0]
-        physics = UNKNOWN if a.term.open else a.term.physics
-        kind = place.rstrip("0123456789")
-        plain = f"{place}-{physics.removeprefix(f'{kind}-')}"
-        count = sum(name == plain or name.startswith(f"{plain}-") for name in out)
-        out.append(plain if count == 0 else f"{plain}-{count + 1}")
-    return tuple(out)
 
 
 def _parameters(fit: Fitted, names: tuple[str, ...]) -> tuple[Parameter, ...]:
@@ -270,9 +248,9 @@ def _effects(
 ) -> tuple[EffectRecord, ...]:
     out, bench = list[EffectRecord](), Bench(fit)
     for i, (a, name) in enumerate(zip(fit.accepted, names, strict=True)):
-        mine, finding = np.flatnonzero(fit.problem.owner == i), _finding_of(a, findings)
+        mine, finding = np.flatnonzero(fit.problem.owner == i), finding_of(a, findings)
         sizes = sizes_of(bench, i) if finding is None and not a.term.open else None
-        out.append(_effect(a, name, finding, fit.drivers, covariance[np.ix_(mine, mine)], sizes))
+        out.append(effect_of_term(a, name, finding, fit.drivers, covariance[np.ix_(mine, mine)], sizes))
     lasting = (e for e in out if e.shape == Shape.STEP.value and not e.variant.endswith((CARRIED, FOR_A_WHILE)))
     return (*out, *map(_aftermath, lasting))
 
@@ -290,90 +268,6 @@ def _aftermath(effect: EffectRecord) -> EffectRecord:
         curve=None,
         after=effect.name,
     )
-
-
-def _effect(
-    a: Accepted, name: str, finding: Finding | None, drivers: Drivers, own: Floats, stated: Mapping[str, Size] | None
-) -> EffectRecord:
-    """`own` (value, value) covariance of its coefficients and smooth inner values; `stated` sizes without a finding."""
-    m, term = len(a.coefficients), a.term
-    named_so = finding is not None and not term.open and finding.name.physics != UNKNOWN
-    physics = UNKNOWN if term.open or (finding is not None and not named_so) else term.physics
-    if finding is not None and named_so:
-        sizes = finding.parameters
-    elif stated is not None:
-        sizes = stated
-    else:
-        inner_sigma = np.zeros(len(a.inner))
-        inner_sigma[term.smooth] = np.sqrt(np.maximum(np.diag(own)[m:], 0.0))
-        sizes = term.sizes(a.coefficients, own[:m, :m], a.inner, inner_sigma)
-    depends_on = ",".join(term.depends_on)
-    values = {driver: range_of(drivers, driver) for driver in depends_on.split(",")}
-    return EffectRecord(
-        name=name,
-        where=term.port.where,
-        physics=physics,
-        depends_on=depends_on,
-        shape=term.shape.value,
-        order=term.order,
-        variant=SECOND
-        if isinstance(term, SmoothCurve) and term.port.instrument == ENCODER_DIFFERENCE
-        else term.variant,
-        parameters={k: _parameter(k, size) for k, size in sizes.items()},
-        coefficients={f"{name}.c{j}": float(c) for j, c in enumerate(a.coefficients)},
-        inner={s.name: float(v) for s, v in zip(term.inner, a.inner, strict=True)},
-        about=_about(a, drivers),
-        holds=holds_of(term).value,
-        range={driver: (float(v.min()), float(v.max())) for driver, v in values.items() if v is not None},
-        confidence=None if finding is None else finding.confidence,
-        listed="" if physics == term.physics else term.physics,
-        curve=_curve(a, drivers, own) if term.open and len(own) == m else None,
-        place=term.port.place.value if isinstance(term, SmoothCurve) else "",
-        frame=term.port.index if isinstance(term, SmoothCurve) and term.port.place is Place.FRAME else None,
-        component=term.component if isinstance(term, SmoothCurve) else None,
-        waves=term.waves if isinstance(term, SmoothCurve) else None,
-    )
-
-
-def _finding_of(a: Accepted, findings: tuple[Finding, ...]) -> Finding | None:
-    """The one that names it, else the unknown cause at its port that has taken it in."""
-    for finding in findings:
-        if finding.name == named(a.term):
-            return finding
-    return next((f for f in findings if f.name.physics == UNKNOWN and f.name.where == a.term.port.where), None)
-
-
-def _about(a: Accepted, drivers: Drivers) -> dict[str, float]:
-    """For a person: what times and temperatures are counted from."""
-    out: dict[str, float] = {}
-    for name in a.term.depends_on:
-        if name == "t":
-            out["start_t_s"] = float(drivers.t_s.min())
-        if (T := drivers.temperatures_degC.get(name.removeprefix("temp_"))) is not None:
-            out["reference_degC"] = float(T.mean())
-    return out
-
-
-def _parameter(name: str, size: Size) -> EffectParameter:
-    sigma = _number(size.sigma)
-    unit = next((u for u in UNITS if name.endswith(f"_{u}")), "1")
-    return EffectParameter(None if sigma is None else _number(size.value), sigma, unit)
-
-
-def _curve(a: Accepted, drivers: Drivers, covariance: Floats) -> EffectCurve | None:
-    """Of an unknown cause of one driver, the component of its port that it moves most."""
-    x = range_of(drivers, a.term.depends_on[0]) if len(a.term.depends_on) == 1 else None
-    if x is None:
-        return None
-    basis = a.term.basis(drivers, a.inner)
-    amount = basis @ a.coefficients
-    component = int(np.argmax(np.ptp(amount, axis=0)))
-    order = np.argsort(x, kind="stable")
-    knots = np.linspace(float(x.min()), float(x.max()), KNOTS)
-    sigma = np.sqrt(np.maximum(np.sum((basis[:, component] @ covariance) * basis[:, component], axis=1), 0.0))
-    unit = "rad" if a.term.port.where.endswith(("angle", "tilt", "twist", "direction")) else "m"
-    values, sigmas = (np.interp(knots, x[order], v[order]) for v in (amount[:, component], sigma))
-    return EffectCurve(a.term.depends_on[0], unit, *(tuple(v.tolist()) for v in (knots, values, sigmas)))
 
 
 def _noise(fit: Fitted, rank: int) -> tuple[Fields, tuple[str, ...]]:
@@ -499,8 +393,3 @@ def _as_listed(
         at += len(a.values)
     turned_covariance = covariance_record(parameters, turn @ covariance @ turn.T)
     return structs.replace(model, effects=tuple(effects), covariance=turned_covariance)
-
-
-def _number(value: float) -> float | None:
-    """JSON has no word for what is not a number."""
-    return value if np.isfinite(value) else None

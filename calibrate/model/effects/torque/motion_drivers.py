@@ -38,7 +38,7 @@ class MotionDrivers(Drivers):
 
     def sense(self, joint: int) -> Floats:
         """(moment,) -1 to 1: which way a joint (from 1) turns; nought while it stands."""
-        return np.tanh(self.qd[:, joint - 1] / self.still_rad_s[joint - 1])
+        return np.clip(self.qd[:, joint - 1] / self.still_rad_s[joint - 1], -1.0, 1.0)
 
 
 def torque_port(joint: int) -> Port:
