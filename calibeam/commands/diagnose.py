@@ -5,17 +5,24 @@ from pathlib import Path
 
 import msgspec
 
-from acquisition.recording import Recording, read
+from acquisition.recording import read
 from acquisition.recording.pose_plan import POSE_PLAN
 from calibeam.console import Console
 from calibeam.overwriting import writes
 from calibeam.printing.progress import stages_shown
 from calibeam.printing.results import print_diagnosis, print_streams
-from calibeam.results.diagnosis import diagnose_recording, diagnose_streams, plan_next, refuse_wrong_file, why_kept
+from calibeam.results.diagnosis import (
+    diagnose_recording,
+    diagnose_streams,
+    model_of,
+    model_of_streams,
+    plan_next,
+    refuse_wrong_file,
+    why_kept,
+)
 from calibeam.results.identification import naming_source
 from calibrate.diagnose.record.file import DIAGNOSIS, write_diagnosis
 from calibrate.diagnose.record.schema import DiagnosisFile
-from calibrate.diagnose.with_model import model_of_diagnosis
 from calibrate.model.model_file import MODEL, ModelFile, read_model, write_model
 from calibrate.report.elements.html import page_output
 
@@ -69,7 +76,14 @@ def diagnose_command(
     known = None if model is None else read_model(model)
     source, console = read(recording), Console()
     if len(source.samples) == 0 and source.streams:
-        _streams_only(console, source, out, json=json)
+        torques, file = diagnose_streams(source, known)
+        write_diagnosis(out, file)
+        modelled = "" if model_out is None else _write_model(model_out, model_of_streams(torques, source), file)
+        if json:
+            print(msgspec.json.encode(file).decode())
+        else:
+            print_streams(console, file)
+        _print_lines(console, (f"diagnosis: {out}", modelled), json=json)
         return
     with naming_source(recording):
         with stages_shown(Console(stderr=True), len(source.samples)) as begun:
@@ -80,15 +94,13 @@ def diagnose_command(
         else:
             print_diagnosis(console, file, verbose=verbose)
         refuse_wrong_file(found, out)
-        modelled = "" if model_out is None else _write_model(model_out, model_of_diagnosis(found, source), file)
+        modelled = "" if model_out is None else _write_model(model_out, model_of(found, source), file)
         planned = "" if plan_out is None else plan_next(found, plan_out)
     reported = msgspec.structs.replace(file, next=(*file.next, planned)) if planned else file
     from calibrate.report.diagnosis import write_diagnosis_report  # draws: nothing of it is needed in a search
 
     page = write_diagnosis_report(out.with_suffix(".html") if report is None else report, source, reported)
-    said = Console(stderr=True) if json else console  # nobody takes a model that was kept for a new one
-    for line in filter(None, (planned, f"diagnosis: {out}", modelled, f"report: {page}")):
-        said.print(line, markup=False, highlight=False)
+    _print_lines(console, (planned, f"diagnosis: {out}", modelled, f"report: {page}"), json=json)
 
 
 def _write_model(path: Path, model: ModelFile, file: DiagnosisFile) -> str:
@@ -99,11 +111,7 @@ def _write_model(path: Path, model: ModelFile, file: DiagnosisFile) -> str:
     return f"model: {path}"
 
 
-def _streams_only(console: Console, source: Recording, out: Path, *, json: bool) -> None:
-    file = diagnose_streams(source)
-    write_diagnosis(out, file)
-    if json:
-        print(msgspec.json.encode(file).decode())
-        return
-    print_streams(console, file)
-    console.print(f"diagnosis: {out}", markup=False, highlight=False)
+def _print_lines(console: Console, lines: tuple[str, ...], *, json: bool) -> None:
+    said = Console(stderr=True) if json else console  # nobody takes a model that was kept for a new one
+    for line in filter(None, lines):
+        said.print(line, markup=False, highlight=False)

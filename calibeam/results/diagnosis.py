@@ -1,6 +1,7 @@
 """From a recording to diagnosis.json: where it disagrees with the model, and why."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -14,7 +15,13 @@ from calibeam.results.controller_findings import controller_notes
 from calibeam.software import SOFTWARE
 from calibrate.diagnose.assess import Verdict
 from calibrate.diagnose.from_recording import Diagnosed, diagnose_samples
-from calibrate.diagnose.motion import TorqueDiagnosis, diagnose_torques, with_torques
+from calibrate.diagnose.motion import (
+    TorqueDiagnosis,
+    diagnose_torques,
+    model_of_motion,
+    torques_of_model,
+    with_torques,
+)
 from calibrate.diagnose.new_poses import plan_of, separating
 from calibrate.diagnose.record.file import write_diagnosis
 from calibrate.diagnose.record.schema import (
@@ -27,7 +34,7 @@ from calibrate.diagnose.record.schema import (
 from calibrate.diagnose.record.to_file import file_of
 from calibrate.diagnose.stages import Stage, Stages
 from calibrate.diagnose.streams import streams_of, with_streams
-from calibrate.diagnose.with_model import known_before, only_new, with_known_model
+from calibrate.diagnose.with_model import known_before, model_of_diagnosis, only_new, with_known_model
 from calibrate.errors import DataError
 from calibrate.model.model_file import ModelFile, read_model
 from calibrate.model.sensors.catalogue import unused_columns
@@ -56,21 +63,29 @@ def diagnose_recording(
     `begun` is called with each stage as it begins.
     DataError where the recording holds too little, or the model is of another rig.
     """
-    if model is not None and model.rig.sha256 != rig_sha256(recording.rig_text):
-        raise DataError(
-            f"the model is of rig '{model.rig.name}', whose file is another than that of {recording.path.name}; "
-            "give the model that was identified with this rig, or none"
-        )
+    _refuse_other_rig(recording, model)
     found, file = _diagnosed(recording, model, keep, begun)
     notes = (*unused_columns(recording.samples), *controller_notes(recording))
     return found, msgspec.structs.replace(file, next=(*file.next, *notes))
 
 
-def diagnose_streams(recording: Recording) -> DiagnosisFile:
-    """What the streams of a recording without samples show: their clocks, lags and faults; nothing of the arm.
+def _refuse_other_rig(recording: Recording, model: ModelFile | None) -> None:
+    if model is not None and model.rig.sha256 != rig_sha256(recording.rig_text):
+        raise DataError(
+            f"the model is of rig '{model.rig.name}', whose file is another than that of {recording.path.name}; "
+            "give the model that was identified with this rig, or none"
+        )
 
-    DataError where the streams are none that a finder knows.
+
+def diagnose_streams(
+    recording: Recording, model: ModelFile | None = None
+) -> tuple[TorqueDiagnosis | None, DiagnosisFile]:
+    """What the streams of a recording without samples show: their clocks, lags and faults, and torques in motion;
+    nothing of the geometry. With a `model` only torques that are new to it.
+
+    DataError where the streams are none that a finder knows, or the model is of another rig.
     """
+    _refuse_other_rig(recording, model)
     report = streams_of(recording, None)
     if report is None:
         known = "joints, commands, a second set of encoders or spots"
@@ -90,43 +105,63 @@ def diagnose_streams(recording: Recording) -> DiagnosisFile:
         software=SOFTWARE,
         rig=RigRecord(recording.rig.name, rig_sha256(recording.rig_text)),
     )
-    file = with_torques(with_streams(nothing, report), _torques_of(recording))
+    torques = _torques_of(recording, model)
+    file = with_torques(with_streams(nothing, report), torques)
     if file.torques is not None:
         file = msgspec.structs.replace(file, next=tuple(one for one in file.next if one not in nothing.next))
     agree = file.verdict == Verdict.CONSISTENT.value
-    return msgspec.structs.replace(file, verdict=Verdict.UNDECIDABLE.value) if agree else file
+    return torques, msgspec.structs.replace(file, verdict=Verdict.UNDECIDABLE.value) if agree else file
 
 
 def _diagnosed(
     recording: Recording, model: ModelFile | None, keep: Keep | None, begun: Callable[[Stage], None] | None
 ) -> tuple[Diagnosed, DiagnosisFile]:
     rng = np.random.default_rng(SEED)
-    if model is None:
+    if model is None or model.poses == 0:  # of a motion alone: nothing of it was known at poses
 
         def causes(so_far: Diagnosed) -> None:
             if keep is not None:
                 keep(file_of(so_far, recording))
 
         found = diagnose_samples(recording.rig, recording.samples, rng, known=causes, begun=begun)
-        return found, _with_streams(file_of(found, recording), recording, found)
+        return _with_streams(file_of(found, recording), recording, found, model)
     known = known_before(model, recording.samples)
     found = diagnose_samples(recording.rig, recording.samples, rng, known.begin, begun=begun)
     if known.same_recording:
         found = only_new(found)  # what its streams show is no part of a model, and not new either
         return found, with_known_model(file_of(found, recording), known, found)
-    return found, _with_streams(with_known_model(file_of(found, recording), known, found), recording, found)
+    return _with_streams(with_known_model(file_of(found, recording), known, found), recording, found, model)
 
 
-def _with_streams(file: DiagnosisFile, recording: Recording, found: Diagnosed) -> DiagnosisFile:
+def _with_streams(
+    file: DiagnosisFile, recording: Recording, found: Diagnosed, model: ModelFile | None
+) -> tuple[Diagnosed, DiagnosisFile]:
     stages, fitted = Stages(), None if found.physics is None else found.physics.model
     whole = stages.attempt(Stage.STREAMS, lambda: with_streams(file, streams_of(recording, fitted)), file)
-    whole = stages.attempt(Stage.TORQUES, lambda: with_torques(whole, _torques_of(recording)), whole)
+    torques = stages.attempt(Stage.TORQUES, lambda: _torques_of(recording, model), None)
     failed = tuple(IncompleteRecord(one.stage.value, one.reason) for one in stages.failed)
-    return msgspec.structs.replace(whole, incomplete=(*whole.incomplete, *failed))
+    whole = with_torques(whole, torques)
+    return replace(found, torques=torques), msgspec.structs.replace(whole, incomplete=(*whole.incomplete, *failed))
 
 
-def _torques_of(recording: Recording) -> TorqueDiagnosis | None:
-    return diagnose_torques(recording, np.random.default_rng(SEED))
+def _torques_of(recording: Recording, model: ModelFile | None) -> TorqueDiagnosis | None:
+    return diagnose_torques(recording, np.random.default_rng(SEED), None if model is None else model.torques)
+
+
+def model_of(found: Diagnosed, recording: Recording) -> ModelFile:
+    """Geometry with the physics found, and the torques of a motion. DataError where there is none."""
+    model, torques = model_of_diagnosis(found, recording), found.torques
+    if torques is None or torques.known is not None:
+        return model
+    return msgspec.structs.replace(model, torques=torques_of_model(torques, recording.path.name))
+
+
+def model_of_streams(torques: TorqueDiagnosis | None, recording: Recording) -> ModelFile:
+    """Of a recording in motion without samples. DataError where no torques were found, or beside a model."""
+    if torques is None or torques.known is not None:
+        why = "no torques in motion" if torques is None else "beside a model only what has changed is sought"
+        raise DataError(f"no model: {why}; diagnose a recording with joint angles and torques without --model")
+    return model_of_motion(recording, torques_of_model(torques, recording.path.name))
 
 
 def plan_next(found: Diagnosed, path: Path) -> str:

@@ -5,6 +5,7 @@ Scatter beyond the stated noise is no noise (stated_noise.py): no session with i
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.random import Generator
@@ -44,6 +45,9 @@ from calibrate.model.effects.term import Missing
 from calibrate.model.problem import Measured
 from calibrate.model.sensors.encoder_difference import NAME as ENCODER_DIFFERENCE
 
+if TYPE_CHECKING:
+    from calibrate.diagnose.motion import TorqueDiagnosis
+
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 
@@ -68,6 +72,7 @@ class Diagnosed:
     blunders: tuple[GrossError, ...]  # of the file, and rows that no model explains
     physics: Physics | None
     incomplete: tuple[Incomplete, ...] = ()  # stages without a result, where there is no physics
+    torques: "TorqueDiagnosis | None" = None  # of a recording in motion
 
     @property
     def why_not(self) -> str:

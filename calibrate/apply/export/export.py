@@ -167,7 +167,7 @@ def export_model(path: Path, rig: Rig, model: ModelFile, form: ExportForm) -> tu
     arm = identified_arm(
         rig, corrections(model), model.about.get("tool"), says, model.parameters, compliance, model.covariance
     )
-    arm = replace(arm, dh_table=model.dh_table)
+    arm = replace(arm, dh_table=model.dh_table, torques=model.torques)
     if form.offsets and with_links:
         says = (*says, NO_OFFSETS if all(refused(zero) for zero in arm.zeros) else TOGETHER)
         arm = replace(arm, not_carried=says)

@@ -13,6 +13,7 @@ from calibrate.model.arms.convert import corrected_parts
 from calibrate.model.arms.coupled_readings import by_reading
 from calibrate.model.arms.eccentric import COSINE, SINE
 from calibrate.model.model_file import Covariance, ModelParameter
+from calibrate.model.torque_records import TorquesOfModel
 
 Floats = NDArray[np.float64]
 
@@ -48,6 +49,7 @@ class IdentifiedArm:
     zeros: tuple[AxisOffset, ...] = ()
     compliance_rad_nm: Mapping[int, float] = field(default_factory=dict[int, float])  # joint from 1: linear ones
     stated: tuple[ModelParameter, ...] = ()  # what the model holds of each correction
+    torques: TorquesOfModel | None = None  # of a model of a motion
     dh_table: tuple[ModelParameter, ...] = ()  # and, of an arm of poses, of those of its standard D-H table
 
     @property

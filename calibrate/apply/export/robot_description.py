@@ -4,7 +4,8 @@ URDF: fixed base, turning joints, a fixed flange and, where known, the tool poin
 urdf/XML/joint: origin first (xyz in m, rpy in rad about fixed axes), then the turn about `axis`. `effort` is obligatory
 there and no matter of calibration: 0 means nothing.
 
-MJCF, for MuJoCo: geometry, masses, and linear joint stiffness, so that it sags. Behind a soft joint stands a second
+MJCF, for MuJoCo: geometry, masses, what a motion has shown of torques (mjcf_torques.py), and linear joint stiffness, so
+that it sags. Behind a soft joint stands a second
 hinge about the same axis with the stiffness found and its rest at zero: `joint3` is the drive, whose angle is the
 reading, `joint3_spring` what the gear yields under load. Source of the form: MuJoCo documentation, XML reference, body,
 joint (stiffness, springref, armature), inertial.
@@ -18,6 +19,7 @@ from scipy.spatial.transform import Rotation
 
 from acquisition.recording.rig import ArmModel
 from calibrate.apply.export.identified import IdentifiedArm, roll_pitch_yaw
+from calibrate.apply.export.mjcf_torques import Body, moving_arm
 from calibrate.model.arms.catalogue import arm_of
 from calibrate.model.parameters import values_by_name
 from calibrate.model.rigid import inverse, transform
@@ -59,19 +61,22 @@ def _joint(name: str, kind: str, links: tuple[str, str], T_parent_child: Floats)
 
 
 SPRING = "_spring"
+AT_REST = ' armature="1"'  # without known rotors: inertia moves no arm that stands
 DAMPING_S = 0.1  # of stiffness: springs come to rest within seconds and do not ring
 LEAST = '<compiler angle="radian" boundmass="1e-6" boundinertia="1e-6"/>'  # what states no mass still can move
 
 
 def mjcf_text(arm: IdentifiedArm) -> str:
     """The file's text; numbers in full precision."""
+    moving = None if arm.torques is None else moving_arm(arm.rig, arm.torques)
+    not_carried = (*arm.not_carried, *(() if moving is None else moving.not_carried))
     lines = [
         f"<mujoco model={quoteattr(arm.rig.name)}>",
         f"  <!-- Identified by calibeam. m, rad, kg; {arm.sign}. -->",
-        *(f"  <!-- {says.replace('--', '- -')} -->" for says in arm.not_carried),
+        *(f"  <!-- {says.replace('--', '- -')} -->" for says in not_carried),
         "  <!-- A payload is not in this file: attach its mass to the body flange, and soft joints yield to it. -->",
         f"  {LEAST}",
-        f'  <option gravity="{_numbers(arm.rig.arm.gravity_m_s2)}"/>',
+        f'  <option gravity="{_numbers(arm.rig.arm.gravity_m_s2 if moving is None else moving.gravity_m_s2)}"/>',
         "  <worldbody>",
     ]
     indent = "    "
@@ -79,8 +84,8 @@ def mjcf_text(arm: IdentifiedArm) -> str:
         lines.append(f'{indent}<body name="link{i}"{_pose(arm.parts[i - 1])}>')
         indent += "  "
         lines.append(
-            f'{indent}<joint name="joint{i}" type="hinge" axis="0 0 1" limited="true" armature="1"'
-            f' range="{low!r} {high!r}"/>'
+            f'{indent}<joint name="joint{i}" type="hinge" axis="0 0 1" limited="true" range="{low!r} {high!r}"'
+            f"{AT_REST if moving is None else moving.joints[i - 1].text}/>"
         )
         if i in arm.compliance_rad_nm:
             stiffness = 1.0 / arm.compliance_rad_nm[i]
@@ -93,10 +98,12 @@ def mjcf_text(arm: IdentifiedArm) -> str:
                 f'{indent}<joint name="joint{i}{SPRING}" type="hinge" axis="0 0 1" limited="false" springref="0"'
                 f' stiffness="{stiffness!r}" damping="{DAMPING_S * stiffness!r}"/>'
             )
-        if joint.mass_kg:
+        if moving is not None:
+            lines.append(_inertial_of(indent, moving.bodies[i - 1]))
+        elif joint.mass_kg:
             lines.append(_inertial(indent, joint.mass_kg, _in_body(arm, i)))
     lines.append(f'{indent}<body name="flange"{_pose(arm.parts[-1])}>')
-    if arm.rig.tool.mass_kg:
+    if arm.rig.tool.mass_kg and moving is None:  # else part of the last link
         lines.append(_inertial(indent + "  ", arm.rig.tool.mass_kg, np.array(arm.rig.tool.com_m or (0.0, 0.0, 0.0))))
     if arm.tool_m is not None:
         lines.append(f'{indent}  <site name="tool_point" pos="{_numbers(arm.tool_m)}"/>')
@@ -121,6 +128,11 @@ def _in_body(arm: IdentifiedArm, link: int) -> Floats:
         if link == arm.rig.n_joints:
             to_body = to_body @ inverse(transform(own.flange.origin_m, own.flange.rotation_rad))
     return np.asarray(to_body[:3, :3] @ com_m + to_body[:3, 3], dtype=np.float64)
+
+
+def _inertial_of(indent: str, body: Body) -> str:
+    tensor = _numbers(body.inertia_kg_m2.tolist())
+    return f'{indent}<inertial pos="{_numbers(body.com_m.tolist())}" mass="{body.mass_kg!r}" fullinertia="{tensor}"/>'
 
 
 def _inertial(indent: str, mass_kg: float, com_m: Floats) -> str:

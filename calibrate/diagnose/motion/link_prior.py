@@ -79,7 +79,8 @@ def _stated(rig: Rig) -> tuple[Floats, Floats]:
             spread = INERTIA_SHARE * max(*joint.inertia_kg_m2[:3], LEAST_KG_M2)
         sigmas.append(_sigmas(rig, values[-1], spread))
     rotors = [_rotor(joint.rotor_inertia_kg_m2) for joint in rig.arm.joints]
-    return tuple(np.concatenate([*each, of]) for each, of in zip((values, sigmas), np.array(rotors).T, strict=True))
+    value, sigma = np.array(rotors).T
+    return np.concatenate([*values, value]), np.concatenate([*sigmas, sigma])
 
 
 def _about(rig: Rig, known: TorquesOfModel) -> tuple[Floats, Floats]:

@@ -1,18 +1,25 @@
-"""A motion as rigid links feel it: what drives each term at every moment, and the links alone fitted to its torques."""
+"""A motion as rigid links feel it: what drives each term at every moment, what a model or simulation expects there, and
+the links alone fitted to its torques.
+"""
+
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.recording.rig import Rig
-from calibrate.diagnose.motion.known_torques import listed_torques
 from calibrate.diagnose.motion.link_prior import link_prior
 from calibrate.diagnose.motion.motion_table import Motion
 from calibrate.diagnose.motion.torque_problem import TorqueProblem
 from calibrate.diagnose.motion.torque_state import TorqueState, with_torque
+from calibrate.errors import DataError
 from calibrate.model.arms.catalogue import arm_of
 from calibrate.model.arms.inverse_dynamics import torque_columns
 from calibrate.model.arms.serial import SerialArm
-from calibrate.model.effects.torque import MotionDrivers
+from calibrate.model.effect_records import EffectCurve, EffectRecord
+from calibrate.model.effects.curve import TORQUE, UNKNOWN, cause
+from calibrate.model.effects.term import Accepted, Shape, Term
+from calibrate.model.effects.torque import MotionDrivers, at_torque, torque_terms
 from calibrate.model.parameters import start_values
 from calibrate.model.rigid import cross_matrix
 from calibrate.model.torque_records import TorquesOfModel
@@ -51,6 +58,15 @@ def torque_state(rig: Rig, motion: Motion, known: TorquesOfModel | None = None) 
     start, everything = np.zeros(links.size), np.arange(len(motion.time_s))
     first = TorqueState(whole, everything, whole, start, np.inf)
     return first.refitted(()).renewed()
+
+
+def expected_nm(rig: Rig, motion: Motion, known: TorquesOfModel) -> Floats:
+    """(moment, joint) torques that a model or simulation expects, also of joints that stand."""
+    drivers, links = motion_drivers(rig, motion, known), link_prior(rig, known).stated
+    given = listed_torques(known.effects, drivers)
+    drivers = with_torque(drivers, links, given)
+    out = (drivers.link_columns @ links).reshape(motion.q_rad.shape)
+    return np.asarray(sum((one.at(drivers) for one in given), out))
 
 
 def motion_drivers(rig: Rig, motion: Motion, known: TorquesOfModel | None = None) -> MotionDrivers:
@@ -117,3 +133,38 @@ def _with_rotors(links: Floats, by_rotor: Floats) -> Floats:
     own = by_rotor[:, :, None] * np.eye(n)
     own = own if links.ndim == 4 else np.repeat(own[:, :, None], links.shape[2], axis=2)
     return np.concatenate([links.reshape(own.size // n, -1), own.reshape(-1, n)], axis=1)
+
+
+def listed_torques(effects: Sequence[EffectRecord], drivers: MotionDrivers) -> tuple[Accepted, ...]:
+    """Each with its term; one that this motion has no place for (ripple of a joint that stands) is left out.
+
+    DataError where the numbers of an effect do not fit its form.
+    """
+    terms = torque_terms(drivers)
+    listed = [_accepted(one, term) for one in effects for term in terms if _is(one, term)]
+    return (*listed, *(_drawn(one, one.curve, drivers.n_joints) for one in effects if one.curve is not None))
+
+
+def _drawn(effect: EffectRecord, curve: EffectCurve, n: int) -> Accepted:
+    """An unknown cause of one driver, through the knots of its curve; beyond them as at the last one."""
+    knots, values = np.array(curve.knots), np.array(curve.values)
+
+    def law(d: MotionDrivers, inner: Floats) -> Floats:
+        return np.interp(cause(d, curve.driver), knots, values)[:, None]
+
+    joint = int(effect.where.removeprefix("joint").removesuffix(TORQUE))
+    term = at_torque(joint, n, UNKNOWN, Shape.LINEAR, (curve.driver,), law, ("share",), np.inf, effect.says)
+    return Accepted(term, np.ones(1), np.zeros(0))
+
+
+def _is(effect: EffectRecord, term: Term) -> bool:
+    physics = effect.listed or effect.physics
+    return (effect.where, physics, effect.order) == (term.port.where, term.physics, term.order)
+
+
+def _accepted(effect: EffectRecord, term: Term) -> Accepted:
+    inner = [effect.inner.get(one.name) for one in term.inner]
+    known = [one for one in inner if one is not None]
+    if len(known) < len(inner):
+        raise DataError(f"effect {effect.name}: inner values are missing; diagnose the recording again")
+    return Accepted(term, np.array(list(effect.coefficients.values()), dtype=float), np.array(known, dtype=float))

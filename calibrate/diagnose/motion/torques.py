@@ -3,6 +3,7 @@ in diagnosis.json.
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,9 +17,17 @@ from calibrate.diagnose.diagnose import diagnose
 from calibrate.diagnose.motion.links_alone import torque_state
 from calibrate.diagnose.motion.motion_table import Motion, motion_of
 from calibrate.diagnose.motion.torque_state import TorqueState
-from calibrate.diagnose.record.schema import TORQUE, DiagnosisFile, JointTorqueRecord, TorquesRecord
+from calibrate.diagnose.record.schema import (
+    TORQUE,
+    ChangedRecord,
+    DiagnosisFile,
+    FindingRecord,
+    JointTorqueRecord,
+    TorquesRecord,
+)
 from calibrate.diagnose.record.to_file import finding_record, unexplained_record
 from calibrate.model.arms.coupled_readings import by_reading
+from calibrate.model.effect_records import EffectRecord
 from calibrate.model.effects.term import Accepted, Missing
 from calibrate.model.effects.torque import TORQUES, friction
 from calibrate.model.torque_records import TorquesOfModel
@@ -35,6 +44,7 @@ class TorqueDiagnosis:
     motion: Motion
     diagnosis: Diagnosis
     bare: TorqueState
+    known: TorquesOfModel | None = None  # beside which it was sought
 
     @property
     def model(self) -> TorqueState:
@@ -58,7 +68,7 @@ def diagnose_torques(
         return None
     bare = torque_state(recording.rig, motion, known)
     missing: tuple[Missing, ...] = tuple(m for kind in TORQUES for m in kind.missing(bare.drivers))
-    return TorqueDiagnosis(motion, diagnose(bare, rng, missing, usual=usual_friction(bare)), bare)
+    return TorqueDiagnosis(motion, diagnose(bare, rng, missing, usual=usual_friction(bare)), bare, known)
 
 
 def usual_friction(bare: TorqueState) -> tuple[Accepted, ...]:
@@ -75,6 +85,7 @@ def with_torques(file: DiagnosisFile, found: TorqueDiagnosis | None) -> Diagnosi
         return file
     said = found.diagnosis
     findings = tuple(structs.replace(finding_record(one, None), stream=TORQUE, curve=None) for one in said.findings)
+    changed = () if found.known is None else tuple(c for one in findings for c in _changed(one, found.known.effects))
     left = tuple(unexplained_record(one, None) for one in said.unexplained)
     first = left[0] if left and file.unexplained is None else file.unexplained
     verdict = said.verdict.value
@@ -87,8 +98,25 @@ def with_torques(file: DiagnosisFile, found: TorqueDiagnosis | None) -> Diagnosi
         unexplained=first,
         also_unexplained=(*file.also_unexplained, *(one for one in left if one is not first)),
         next=(*_to_record(said), *file.next),
-        torques=TorquesRecord(found.motion.made, tuple(_joints(found))),
+        changed=(*file.changed, *changed),
+        torques=TorquesRecord(
+            found.motion.made, tuple(_joints(found)), "" if found.known is None else found.known.source
+        ),
     )
+
+
+def _changed(finding: FindingRecord, effects: Sequence[EffectRecord]) -> tuple[ChangedRecord, ...]:
+    """Of an effect that was known: its sigma of then is part of that of the change."""
+    same = (finding.where, finding.physics, finding.order)
+    was = next((e for e in effects if (e.where, e.physics, e.order) == same), None)
+    out: list[ChangedRecord] = []
+    for name, by in finding.parameters.items():
+        before = None if was is None else was.parameters.get(name)
+        if was is None or before is None or None in (by.value, by.sigma, before.value, before.sigma):
+            continue
+        sigma = math.hypot(by.sigma or 0.0, before.sigma or 0.0)
+        out.append(ChangedRecord(f"{was.name}.{name}", before.value, by.value or 0.0, sigma))
+    return tuple(out)
 
 
 def _to_record(said: Diagnosis) -> tuple[str, ...]:

@@ -113,6 +113,7 @@ class TorquesRecord(Record, frozen=True):
 
     made: Sentence
     joints: Many[JointTorqueRecord]
+    known: Label = ""  # the model or simulation beside which causes were sought; of none: the rig file
 
 
 class UnexplainedRecord(Record, frozen=True):
