@@ -176,9 +176,24 @@ def print_reconciliation(console: Console, file: ReconcileFile) -> None:
         )
         stated = "" if one.stated_m is None else f"; stated noise {length(one.stated_m)}"
         _say(console, f"{one.instrument}, {one.rows} unseen rows, rms: " + ", ".join(parts) + stated)
+    for line in _torque_lines(file):
+        _say(console, line)
     _list(console, "what the simulation lacks:", [one.says for one in file.left_out])
     _list(console, "what remains:", file.remains)
     _list(console, "what to do next:", file.next if file.remains else ())
+
+
+def _torque_lines(file: ReconcileFile) -> Iterator[str]:
+    """One a joint: the torque that is left on the unseen part of a motion, and how far a replay is off."""
+    for one in file.torques:
+        left = [("before", one.before_nm), ("links fitted", one.links_nm), ("with the physics", one.after_nm)]
+        torque = ", ".join(f"{what} {significant(size)}" for what, size in left if size is not None)
+        line = (
+            f"joint {one.joint}, Nm rms of {significant(one.torque_nm)}: {torque} (noise {significant(one.noise_nm)})"
+        )
+        off = [one.tracking_before_rad, one.tracking_links_rad, one.tracking_after_rad]
+        replayed = ", ".join(significant(1e3 * size) for size in off if size is not None)
+        yield f"{line}; replay {replayed} mrad" if replayed else line
 
 
 def _list(console: Console, title: str, lines: Sequence[str]) -> None:

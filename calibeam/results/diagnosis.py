@@ -10,7 +10,7 @@ import numpy as np
 
 from acquisition.recording import Recording
 from acquisition.recording.pose_plan import write_pose_plan
-from acquisition.recording.rig import rig_sha256
+from acquisition.recording.rig import Rig, rig_sha256
 from calibeam.results.controller_findings import controller_notes
 from calibeam.software import SOFTWARE
 from calibrate.diagnose.assess import Verdict
@@ -93,7 +93,18 @@ def diagnose_streams(
             f"{recording.path}: no samples, and no stream of {known}; import the log with its columns stated: "
             '--columns "A1..A6 [deg] = q"'
         )
-    nothing = DiagnosisFile(
+    nothing = without_samples(recording.rig, recording.rig_text)
+    torques = _torques_of(recording, model)
+    file = with_torques(with_streams(nothing, report), torques)
+    if file.torques is not None:
+        file = msgspec.structs.replace(file, next=tuple(one for one in file.next if one not in nothing.next))
+    agree = file.verdict == Verdict.CONSISTENT.value
+    return torques, msgspec.structs.replace(file, verdict=Verdict.UNDECIDABLE.value) if agree else file
+
+
+def without_samples(rig: Rig, text: str) -> DiagnosisFile:
+    """Of a recording of streams alone, before these are looked at."""
+    return DiagnosisFile(
         schema=SCHEMA,
         verdict=Verdict.CONSISTENT.value,
         noise_floor_m=None,
@@ -101,16 +112,10 @@ def diagnose_streams(
         rms_after_m=None,
         findings=(),
         unexplained=None,
-        next=(NEXT_OF_AN_ARM if recording.rig.n_joints else NEXT_OF_ENCODERS,),
+        next=(NEXT_OF_AN_ARM if rig.n_joints else NEXT_OF_ENCODERS,),
         software=SOFTWARE,
-        rig=RigRecord(recording.rig.name, rig_sha256(recording.rig_text)),
+        rig=RigRecord(rig.name, rig_sha256(text)),
     )
-    torques = _torques_of(recording, model)
-    file = with_torques(with_streams(nothing, report), torques)
-    if file.torques is not None:
-        file = msgspec.structs.replace(file, next=tuple(one for one in file.next if one not in nothing.next))
-    agree = file.verdict == Verdict.CONSISTENT.value
-    return torques, msgspec.structs.replace(file, verdict=Verdict.UNDECIDABLE.value) if agree else file
 
 
 def _diagnosed(

@@ -26,7 +26,13 @@ from calibrate.report.elements.html import (
 from calibrate.report.elements.svg import drawn, log_axis
 from calibrate.report.elements.tones import Tone
 
-CONTENTS = {"before": "Before", "left-out": "What the simulation lacks", "after": "After", "remains": "What remains"}
+CONTENTS = {
+    "before": "Before",
+    "left-out": "What the simulation lacks",
+    "after": "After",
+    "torques": "Torques of the motion",
+    "remains": "What remains",
+}
 SMALLEST_M = 1e-12  # of a row that a logarithmic axis can show
 CHAINS = 3  # pictures of the chain: the first differences
 
@@ -49,6 +55,13 @@ def reconciliation_html(file: ReconcileFile, rig: Rig, first_link: str | None) -
         CONTENTS,
         (verdict, _before(file, first_link), _left_out(file, len(rig.arm.joints)), _after(file), _remains(file)),
     )
+    if file.torques and not file.unseen:
+        contents = {name: CONTENTS[name] for name in ("left-out", "torques", "remains")}
+        chapters = verdict, _left_out(file, len(rig.arm.joints)), _torques(file), _remains(file)
+    elif file.torques:
+        chapters = (*chapters[:-1], _torques(file), chapters[-1])
+    else:
+        contents = {name: says for name, says in CONTENTS.items() if name != "torques"}
     if not file.seen:
         contents, chapters = {"remains": CONTENTS["remains"]}, (verdict, _remains(file))
     return page(f"Reconciliation of {file.measured}", masthead, contents, chapters, SOFTWARE, kind="reconciliation")
@@ -105,6 +118,30 @@ def _after(file: ReconcileFile) -> Html:
     head = ("Instrument", "unseen rows", "before", "after geometry", "after physics", "noise", "stated noise")
     listed = table(head, rows, numeric=range(1, 5), caption="rms of a coordinate, and how many times the noise")
     return section("after", CONTENTS["after"], lead, listed, *_pictures(file, "after"))
+
+
+def _torques(file: ReconcileFile) -> Html:
+    lead = (
+        "Measured less expected torque on the end of the motion, which nothing was fitted to, Nm rms; and how far the "
+        "joints are from the recorded ones when the simulated arm follows the recorded set-points in closed loop."
+    )
+    states, joints = ("before", "links fitted", "with the physics"), file.torques
+    torques = [(one.torque_nm, one.before_nm, one.links_nm, one.after_nm, one.noise_nm) for one in joints]
+    replays = [(one.tracking_before_rad, one.tracking_links_rad, one.tracking_after_rad) for one in joints]
+    parts = [_by_joint(file, ("torque", *states, "noise"), torques, 1.0, "torque, Nm rms")]
+    if any(off is not None for one in replays for off in one):
+        parts.append(_by_joint(file, states, replays, 1e3, "replay less recording, mrad rms"))
+    return section("torques", CONTENTS["torques"], lead, *parts)
+
+
+def _by_joint(
+    file: ReconcileFile, head: Sequence[str], sizes: Sequence[Sequence[float | None]], factor: float, caption: str
+) -> Html:
+    rows = [
+        (str(one.joint), *("-" if size is None else significant(factor * size) for size in each))
+        for one, each in zip(file.torques, sizes, strict=True)
+    ]
+    return table(("Joint", *head), rows, numeric=range(len(head) + 1), caption=caption)
 
 
 def _remains(file: ReconcileFile) -> Html:

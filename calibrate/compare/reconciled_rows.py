@@ -21,6 +21,7 @@ from calibrate.compare.matched import (
 )
 from calibrate.diagnose import limits
 from calibrate.diagnose.assess import Verdict
+from calibrate.diagnose.motion import JointTorquesRecord
 from calibrate.diagnose.record.schema import DiagnosisFile
 from calibrate.errors import DataError
 from calibrate.model.sensors import (
@@ -115,6 +116,7 @@ class ReconcileFile(msgspec.Struct, frozen=True):
     next: tuple[str, ...]
     notes: tuple[str, ...]
     all_rows: tuple[AllRowsRecord, ...] = ()
+    torques: tuple[JointTorquesRecord, ...] = ()  # of a recording in motion
 
 
 def split(samples: Samples, seed: int) -> tuple[Ints, Ints]:

@@ -1,12 +1,16 @@
-"""Friction hidden in an emulated UR5e that is moved and recorded over its wires: `diagnose` names it with its size."""
+"""Friction hidden in an emulated UR5e that is moved and recorded over its wires: `diagnose` names it with its size,
+`reconcile` brings the simulation of its rig file to move as it does, and the model stands in MuJoCo.
+"""
 
 import json
 import re
 import subprocess
 import sys
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
+import mujoco
 import numpy as np
 import pytest
 
@@ -38,11 +42,9 @@ def rig_text() -> str:
     return re.sub(r"joint_zero_max_rad = .*\n", "", text)
 
 
-@pytest.fixture
-def emulated(tmp_path: Path) -> Iterator[str]:
+@contextmanager
+def emulated(rig: Path) -> Iterator[str]:
     """Address of the robot of `calibeam emulate --hide`."""
-    rig = tmp_path / "rig.toml"
-    rig.write_text(rig_text(), encoding="utf-8")
     hidden = ["--hide", f"coulomb joint3 {FRICTION_NM}"]
     served = ["--json", "--end-with-stdin", "--robot-host", "auto", "--time-scale", "4", *hidden]
     command = [sys.executable, "-m", "calibeam", "emulate", str(rig), *served]
@@ -78,11 +80,46 @@ def record_motion(host: str, path: Path) -> None:
     assert not failures
 
 
-def test_dry_friction_is_named_at_its_joint_with_its_size(emulated: str, tmp_path: Path) -> None:
-    path, out = tmp_path / "motion.mcap", tmp_path / "diagnosis.json"
-    record_motion(emulated, path)
-    assert run(["diagnose", str(path), "--out", str(out)]) == 0
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A motion of the robot; rig.toml beside it does not know what is hidden."""
+    folder = tmp_path_factory.mktemp("motion")
+    (folder / "rig.toml").write_text(rig_text(), encoding="utf-8")
+    with emulated(folder / "rig.toml") as host:
+        record_motion(host, folder / "motion.mcap")
+    return folder / "motion.mcap"
+
+
+def test_dry_friction_is_named_at_its_joint_with_its_size(recorded: Path, tmp_path: Path) -> None:
+    out = tmp_path / "diagnosis.json"
+    assert run(["diagnose", str(recorded), "--out", str(out)]) == 0
     said = json.loads(out.read_text(encoding="utf-8"))
     found = [one for one in said["findings"] if one["share"] > 0.01]
     assert [(one["physics"], one["where"]) for one in found] == [("coulomb-friction", "joint3.torque")]
     assert found[0]["parameters"]["friction_nm"]["value"] == pytest.approx(FRICTION_NM, rel=0.02)
+
+
+def test_the_simulation_of_its_rig_file_is_brought_to_move_as_the_robot(recorded: Path, tmp_path: Path) -> None:
+    out = tmp_path / "reconciled"
+    assert (
+        run(["reconcile", str(recorded), "--simulation", str(recorded.with_name("rig.toml")), "--out", str(out)]) == 0
+    )
+    joints = {one["joint"]: one for one in json.loads((out / "reconcile.json").read_text())["torques"]}
+    assert joints[3]["before_nm"] == pytest.approx(FRICTION_NM, rel=0.05)
+    assert joints[3]["after_nm"] < 0.05 * joints[3]["before_nm"]
+    for one in joints.values():  # a second of motion learned by the servo of one arm moves the other one, too
+        assert one["tracking_after_rad"] < 1e-4
+    assert joints[3]["tracking_after_rad"] < 0.3 * joints[3]["tracking_before_rad"]
+
+
+def test_a_model_of_it_moves_on_in_mujoco_and_knows_what_is_not_new(recorded: Path, tmp_path: Path) -> None:
+    model, arm = tmp_path / "model.json", tmp_path / "arm.xml"
+    own = ["--out", str(tmp_path / "diagnosis.json")]
+    assert run(["diagnose", str(recorded), "--model-out", str(model), *own]) == 0
+    assert run(["export-model", str(model), "--to", "mjcf", "--out", str(arm)]) == 0
+    loaded = mujoco.MjModel.from_xml_path(str(arm))
+    assert loaded.dof_frictionloss[2] == pytest.approx(FRICTION_NM, rel=0.02)
+    assert run(["diagnose", str(recorded), "--model", str(model), *own]) == 0
+    said = json.loads((tmp_path / "diagnosis.json").read_text(encoding="utf-8"))
+    assert said["torques"]["known"] == "motion.mcap"
+    assert [one for one in said["findings"] if one["share"] > 0.01 and one["where"] == "joint3.torque"] == []

@@ -60,6 +60,16 @@ def link_prior(rig: Rig, known: TorquesOfModel | None = None) -> LinkPrior:
     return LinkPrior(stated, ways)
 
 
+def torques_of_rig(rig: Rig, source: str) -> TorquesOfModel | None:
+    """What a rig file states of the torques; None where it states no masses."""
+    if any(joint.mass_kg is None for joint in rig.arm.joints):
+        return None
+    numbers, n = _stated(rig)[0], rig.n_joints
+    links = numbers[: n * len(NUMBERS)].reshape(n, -1).tolist()
+    rotors = tuple(numbers[n * len(NUMBERS) :].tolist())
+    return TorquesOfModel(source, tuple(map(tuple, links)), rotors, rig.arm.gravity_m_s2)
+
+
 def _stated(rig: Rig) -> tuple[Floats, Floats]:
     """(link number,) each: value and one sigma."""
     values, sigmas = list[Floats](), list[Floats]()

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from calibrate.diagnose import limits
 from calibrate.diagnose.motion.torque_problem import TorqueProblem, plain_sizes
 from calibrate.diagnose.state.linearised import UnseenMisfits, WhitenedRows
-from calibrate.fit.noise import Scatter, likelihood_of, scatter_of
+from calibrate.fit.noise import Scatter, likelihood_of, scatter_of, sigma_about_zero
 from calibrate.fit.solvers import NEAR_START, solve
 from calibrate.model.arms.inverse_dynamics import NUMBERS
 from calibrate.model.effects.term import Accepted, Term
@@ -50,6 +50,15 @@ class TorqueState:
     def links(self) -> Floats:
         """(link number,)"""
         return self.problem.split(self.theta)[0]
+
+    @property
+    def noise_nm(self) -> Floats:
+        """(joint,) one sigma by the normal law: under Student's t the size of the noise is smaller."""
+        problem = replace(self.problem, weights=np.ones_like(self.problem.weights))
+        new, joints = problem.whitened(problem.misfit_nm(self.theta)), range(self.drivers.n_joints)
+        each = [new[problem.joint == j] for j in joints]
+        wider = np.array([sigma_about_zero(one, axis=0) if len(one) else 1.0 for one in each], dtype=float)
+        return problem.sigma_nm * wider
 
     @property
     def samples(self) -> int:

@@ -12,6 +12,7 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 
 from acquisition.recording import Recording
+from acquisition.recording.rig import Rig
 from calibrate.diagnose.assess.diagnosis import Diagnosis, Verdict
 from calibrate.diagnose.diagnose import diagnose
 from calibrate.diagnose.motion.links_alone import torque_state
@@ -64,9 +65,12 @@ def diagnose_torques(
     """
     coupled = by_reading(recording.rig.arm) is not None  # torques of such drives are shared out between two joints
     motion = None if coupled else motion_of(recording)
-    if motion is None:
-        return None
-    bare = torque_state(recording.rig, motion, known)
+    return None if motion is None else diagnose_motion(recording.rig, motion, rng, known)
+
+
+def diagnose_motion(rig: Rig, motion: Motion, rng: Generator, known: TorquesOfModel | None = None) -> TorqueDiagnosis:
+    """The same of moments of a motion."""
+    bare = torque_state(rig, motion, known)
     missing: tuple[Missing, ...] = tuple(m for kind in TORQUES for m in kind.missing(bare.drivers))
     return TorqueDiagnosis(motion, diagnose(bare, rng, missing, usual=usual_friction(bare)), bare, known)
 
@@ -132,7 +136,7 @@ def _to_record(said: Diagnosis) -> tuple[str, ...]:
 
 def _joints(found: TorqueDiagnosis) -> list[JointTorqueRecord]:
     proofs = {one.instrument: one for one in found.diagnosis.proofs if one.split == JUDGED}
-    out: list[JointTorqueRecord] = []
+    out, noise_nm = list[JointTorqueRecord](), found.model.noise_nm
     for j in range(found.motion.torque_nm.shape[1]):
         torque = found.motion.torque_nm[:, j]
         proof = proofs.get(f"joint{j + 1}.torque")
@@ -143,7 +147,7 @@ def _joints(found: TorqueDiagnosis) -> list[JointTorqueRecord]:
                 joint=j + 1,
                 moments=int(np.isfinite(torque).sum()),
                 torque_nm=float(np.sqrt(np.nanmean(torque**2))),
-                noise_nm=float(found.model.problem.sigma_nm[j]),
+                noise_nm=float(noise_nm[j]),
                 unseen_before_nm=None if proof is None else _number(proof.rms_before_m),
                 unseen_after_nm=None if proof is None else _number(proof.rms_after_m),
             )

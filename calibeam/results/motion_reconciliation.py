@@ -1,0 +1,135 @@
+"""Torques of a simulation brought to agree with a recorded motion: learned from its first part, judged on the rest, as
+torque and as a replay in closed loop.
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import msgspec
+import numpy as np
+
+from acquisition.recording import Recording
+from acquisition.recording.rig import Rig, load_rig
+from calibeam.results.diagnosis import SEED, without_samples
+from calibeam.simulation.closed_loop import tracked
+from calibeam.software import SOFTWARE
+from calibrate.compare.reconciled_rows import LackingRecord, ReconcileFile
+from calibrate.diagnose.motion import (
+    JointTorquesRecord,
+    MotionReconciled,
+    TorqueDiagnosis,
+    reconcile_motion,
+    torques_of_rig,
+    with_torques,
+)
+from calibrate.diagnose.record.schema import DiagnosisFile
+from calibrate.model.torque_records import TorquesOfModel
+from calibrate.quantities import counted, significant
+
+NO_TORQUES = "no torques beside joint angles in motion; record both, in one stream or two, for 20 s and more"
+NOT_BETTER = "no model: on the unseen part of the motion it is no better than the simulation, or than its links alone"
+
+
+@dataclass(frozen=True, eq=False)
+class MotionPart:
+    """What a motion adds to a reconciliation; `model` None: it would be no better on the unseen part."""
+
+    file: ReconcileFile
+    found: TorqueDiagnosis  # of the first part
+    diagnosis: DiagnosisFile  # of it alone
+    model: TorquesOfModel | None
+
+
+def reconcile_torques(measured: Recording, simulated: TorquesOfModel | None, name: str) -> MotionPart | None:
+    """None where the recording holds no torques in motion. `simulated` None: the simulation states no masses."""
+    found = reconcile_motion(measured, simulated, np.random.default_rng(SEED))
+    if found is None:
+        return None
+    joints, why_not = _replayed(measured, found)
+    said = found.found.diagnosis
+    remains = [f"unexplained at {one.where}: {one.why}" for one in said.unexplained]
+    remains += [
+        f"torque of joint {one.joint}: {significant(one.after_nm)} Nm are left, {significant(one.noise_nm)} Nm is noise"
+        for one in joints
+        if not found.agrees and one.after_nm > found.agrees_at * one.noise_nm
+    ]
+    lacking = tuple(
+        LackingRecord(
+            f.name.where, f.name.physics, f.says, tuple(f"{r.name.physics} at {r.name.where}" for r in f.rivals)
+        )
+        for f in said.findings
+    )
+    notes = (found.found.motion.made, *found.brought.notes, *filter(None, (why_not,)))
+    notes = notes if found.better else (*notes, NOT_BETTER)
+    file = ReconcileFile(
+        schema=1,
+        kind="calibeam-reconciliation",
+        software=SOFTWARE,
+        measured=measured.path.name,
+        simulation=name,
+        verdict="differ" if remains else "agree",
+        says=_says(found, agree=not remains),
+        seed=SEED,
+        seen=found.found.model.samples,
+        unseen_rows=(),
+        unseen=(),
+        rows=(),
+        left_out=lacking,
+        remains=tuple(remains),
+        next=(),
+        notes=notes,
+        torques=joints,
+    )
+    diagnosis = with_torques(without_samples(measured.rig, measured.rig_text), found.found)
+    return MotionPart(file, found.found, diagnosis, found.brought if found.better else None)
+
+
+def torques_stated(simulation: Path, rig: Rig) -> TorquesOfModel | None:
+    """What a simulation states of the torques; None where it states no masses, or is a recording."""
+    if simulation.suffix == ".toml":
+        return torques_of_rig(load_rig(simulation), simulation.name)
+    return None
+
+
+def _replayed(measured: Recording, found: MotionReconciled) -> tuple[tuple[JointTorquesRecord, ...], str]:
+    """The joints with their tracking, or why there is none."""
+    arms = [one for one in (found.simulated, found.links, found.brought) if one is not None]
+    tracking, why_not = tracked(measured, arms, found.cut_s)
+    if tracking is None:
+        return found.joints, why_not
+    before, links, after = (None, *tracking) if found.simulated is None else tracking
+    joints = tuple(
+        msgspec.structs.replace(
+            one,
+            tracking_before_rad=None if before is None else float(before[one.joint - 1]),
+            tracking_links_rad=float(links[one.joint - 1]),
+            tracking_after_rad=float(after[one.joint - 1]),
+        )
+        for one in found.joints
+    )
+    return joints, ""
+
+
+def _says(found: MotionReconciled, *, agree: bool) -> str:
+    causes = counted(len(found.found.diagnosis.findings), "cause")
+    how = "Torques of simulation and recording agree" if agree else "Torques of simulation and recording still differ"
+    return f"{how} on the unseen part of the motion with the {causes} found in the part before it."
+
+
+def with_motion(file: ReconcileFile | None, part: MotionPart | None) -> ReconcileFile:
+    """A reconciliation of poses, of a motion, or of both."""
+    if file is None or part is None:
+        alone = file if part is None else part.file
+        if alone is None:
+            raise ValueError("nothing was reconciled")
+        return alone
+    more = part.file
+    return msgspec.structs.replace(
+        file,
+        verdict="differ" if more.remains and file.verdict == "agree" else file.verdict,
+        says=f"{file.says} {more.says}",
+        left_out=(*file.left_out, *more.left_out),
+        remains=(*file.remains, *more.remains),
+        notes=tuple(dict.fromkeys((*file.notes, *more.notes))),
+        torques=more.torques,
+    )
