@@ -1,6 +1,7 @@
 """`make bench`: every benchmark, or those named: `python -m benchmarks centring zeros`; some in slices (slices.py)."""
 
 import math
+import os
 import sys
 import tempfile
 from collections.abc import Callable
@@ -31,6 +32,7 @@ from benchmarks import (
     log_cost,
     measuring_arm,
     motion,
+    panda_motion,
     plan_taken,
     proof_comparison,
     proof_misses,
@@ -134,6 +136,12 @@ def run_drawn_motion() -> None:
 def run_motion() -> None:
     print("torques of a real robot in motion: learned from record A, proved on record B, which no fit has seen")
     for row in motion.lines(RIG.parents[2] / "shared" / "data" / "kr300-encoders"):
+        print(row)
+
+
+def run_panda_motion() -> None:
+    print("torques of a real 7-axis robot: learned from the first 70 % of a motion, proved on the rest")
+    for row in panda_motion.lines(Path(os.environ.get("PANDA_MOTION", "rbt_log"))):
         print(row)
 
 
@@ -297,6 +305,7 @@ BENCHMARKS: dict[str, Callable[[], None]] = {
     "real": run_real,
     "drawn_motion": run_drawn_motion,
     "motion": run_motion,
+    "panda_motion": run_panda_motion,
     "sockets": run_sockets,
     "proof": run_proof,
     "diagnosis_speed": run_diagnosis_speed,

@@ -16,11 +16,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.recording import Recording, read
+from acquisition.recording.rig import Rig
 from calibeam.cli import run
+from calibrate.diagnose.motion import TorqueDiagnosis, expected_nm, torques_of_model
 from calibrate.diagnose.motion.links_alone import torque_state
-from calibrate.diagnose.motion.motion_table import motion_of
-from calibrate.diagnose.motion.torque_state import TorqueState, with_torque
-from calibrate.diagnose.motion.torques import TorqueDiagnosis, diagnose_torques, usual_friction
+from calibrate.diagnose.motion.motion_table import Motion, motion_of
+from calibrate.diagnose.motion.torques import diagnose_motion, usual_friction
+from calibrate.model.effects.term import with_sigma
+from calibrate.model.torque_records import TorquesOfModel
 
 Floats = NDArray[np.float64]
 
@@ -65,41 +68,43 @@ def recording_of(folder: Path, record: str, out: Path) -> Recording:
     return read(path)
 
 
-def diagnosed(recording: Recording) -> TorqueDiagnosis:
+def motion_in(recording: Recording) -> Motion:
     """ValueError where the recording shows no torques."""
-    found = diagnose_torques(recording, np.random.default_rng(SEED))
-    if found is None:
-        raise ValueError(f"{recording.path}: no torques in motion")
-    return found
-
-
-def left_nm(model: TorqueState, other: Recording) -> tuple[Floats, Floats]:
-    """Of each joint of a recording that the model has not seen: rms of its torque, and of what the model leaves."""
-    unseen = seen_as_links(other).whole
-    drivers = with_torque(unseen.drivers, model.links, model.accepted)
-    problem = replace(unseen, terms=model.problem.terms, sizes=model.problem.sizes, drivers=drivers)
-    return _rms(problem.joint, problem.observed_nm), _rms(problem.joint, problem.misfit_nm(model.theta))
-
-
-def seen_as_links(recording: Recording) -> TorqueState:
-    """With the links alone. ValueError where the recording shows no torques."""
     motion = motion_of(recording)
     if motion is None:
         raise ValueError(f"{recording.path}: no torques in motion")
-    return torque_state(recording.rig, motion)
+    return motion
 
 
-def least_squares(recording: Recording) -> TorqueState:
-    """Links, rotors and the usual friction, every joint by the spread of its torque, in one step without weights."""
-    bare = seen_as_links(recording)
+def torque_nm(motion: Motion) -> Floats:
+    """(joint,) rms."""
+    return rms(motion.torque_nm)
+
+
+def left_nm(rig: Rig, motion: Motion, known: TorquesOfModel) -> Floats:
+    """(joint,) rms of what a model leaves of a motion that it has not seen."""
+    return rms(motion.torque_nm - expected_nm(rig, motion, known))
+
+
+def left_by_least_squares_nm(rig: Rig, seen: Motion, unseen: Motion) -> Floats:
+    """The same of links, rotors and the usual friction, every joint by the spread of its torque, in one step without
+    weights.
+    """
+    bare, new = torque_state(rig, seen), torque_state(rig, unseen).whole
     full = bare.refitted(usual_friction(bare))
     problem = full.problem
-    scale = 1.0 / _rms(problem.joint, problem.observed_nm)[problem.joint]
+    scale = 1.0 / _rms_of_joint(problem.joint, problem.observed_nm)[problem.joint]
     terms = [problem.felt(a.term.basis(problem.drivers, a.inner)) for a in full.accepted]
     columns = np.concatenate([problem.columns @ problem.links.ways, *terms], axis=1) * scale[:, None]
     size = np.maximum(np.linalg.norm(columns, axis=0), 1e-12)
     theta = np.linalg.lstsq(columns / size, problem.observed_nm * scale, rcond=1e-9)[0] / size
-    return replace(full, theta=theta)
+    other = replace(new, terms=problem.terms, sizes=problem.sizes)
+    return _rms_of_joint(other.joint, other.misfit_nm(theta))
+
+
+def rms(values: Floats) -> Floats:
+    """(joint,) of (moment, joint), where there are any."""
+    return np.asarray(np.sqrt(np.nanmean(values**2, axis=0)))
 
 
 def lines(folder: Path) -> Iterator[str]:
@@ -109,24 +114,26 @@ def lines(folder: Path) -> Iterator[str]:
         return
     with tempfile.TemporaryDirectory() as work:
         a, b = (recording_of(folder, record, Path(work)) for record in "AB")
-    of_a, of_b = diagnosed(a), diagnosed(b)
-    torque, left = left_nm(of_a.model, b)
-    _, plain = left_nm(least_squares(a), b)
+    rig, seen, unseen = a.rig, motion_in(a), motion_in(b)
+    of_a, of_b = (diagnose_motion(rig, one, np.random.default_rng(SEED)) for one in (seen, unseen))
+    torque, left = torque_nm(unseen), left_nm(rig, unseen, torques_of_model(of_a, "A"))
+    plain = left_by_least_squares_nm(rig, seen, unseen)
     authors = _authors(folder)
     yield of_a.motion.made
     yield HEAD
     yield "|" + "---|" * (HEAD.count("|") - 1)
     for j in range(len(torque)):
         shares = " | ".join(f"{100 * one[j] / torque[j]:.1f} %" for one in (left, plain))
-        friction = " | ".join(_friction(one, j + 1) for one in (of_a, of_b))
+        friction = " | ".join(friction_of(one, j + 1) for one in (of_a, of_b))
         yield f"| {j + 1} | {torque[j]:.0f} Nm | {shares} | {friction} | {authors[j]} |"
 
 
-def _friction(found: TorqueDiagnosis, joint: int) -> str:
+def friction_of(found: TorqueDiagnosis, joint: int) -> str:
+    """Dry and viscous friction that was found at a joint (from 1), with one sigma."""
     mine = [f for f in found.diagnosis.findings if f.name.where == f"joint{joint}.torque"]
     each = (next(iter(f.parameters.items())) for f in mine if "friction" in f.name.physics)
     units = {"friction_nm": "Nm", "friction_nms_per_rad": "Nms"}
-    return ", ".join(f"{size.value:.0f} ± {size.sigma:.0f} {units.get(name, name)}" for name, size in sorted(each))
+    return ", ".join(f"{with_sigma(size.value, size.sigma)} {units.get(name, name)}" for name, size in sorted(each))
 
 
 def _authors(folder: Path) -> list[str]:
@@ -136,5 +143,5 @@ def _authors(folder: Path) -> list[str]:
     return [f"{float(coul) + float(a):.0f} Nm, {float(vis):.0f} Nms" for coul, a, vis in each]
 
 
-def _rms(joint: NDArray[np.intp], values: Floats) -> Floats:
+def _rms_of_joint(joint: NDArray[np.intp], values: Floats) -> Floats:
     return np.asarray(np.sqrt(np.bincount(joint, values**2) / np.bincount(joint)))

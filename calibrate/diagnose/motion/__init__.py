@@ -4,7 +4,12 @@ from calibrate.diagnose.motion.link_prior import torques_of_rig
 from calibrate.diagnose.motion.links_alone import expected_nm
 from calibrate.diagnose.motion.to_model import model_of_motion, torques_of_model
 from calibrate.diagnose.motion.torques import TorqueDiagnosis, diagnose_torques, with_torques
-from calibrate.diagnose.motion.unseen_motion import JointTorquesRecord, MotionReconciled, reconcile_motion
+from calibrate.diagnose.motion.unseen_motion import (
+    JointTorquesRecord,
+    MotionReconciled,
+    motion_in_two,
+    reconcile_motion,
+)
 
 __all__ = [
     "JointTorquesRecord",
@@ -13,6 +18,7 @@ __all__ = [
     "diagnose_torques",
     "expected_nm",
     "model_of_motion",
+    "motion_in_two",
     "reconcile_motion",
     "torques_of_model",
     "torques_of_rig",

@@ -73,8 +73,7 @@ def reconcile_motion(recording: Recording, simulated: TorquesOfModel | None, rng
     motion = motion_of(recording)
     if motion is None:
         return None
-    cut = round(SEEN * len(motion.time_s))
-    seen, unseen = _part(motion, slice(None, cut)), _part(motion, slice(cut, None))
+    seen, unseen = motion_in_two(motion)
     if not np.isfinite(unseen.torque_nm).any():
         raise DataError(f"{recording.path}: no joint moves in the last part of the motion, by which a model is judged")
     rig, source = recording.rig, recording.path.name
@@ -97,6 +96,12 @@ def reconcile_motion(recording: Recording, simulated: TorquesOfModel | None, rng
         if np.isfinite(unseen.torque_nm[:, j]).any()
     )
     return MotionReconciled(found, simulated, links, brought, float(unseen.time_s[0]), joints)
+
+
+def motion_in_two(motion: Motion) -> tuple[Motion, Motion]:
+    """Its seen and its unseen part."""
+    cut = round(SEEN * len(motion.time_s))
+    return _part(motion, slice(None, cut)), _part(motion, slice(cut, None))
 
 
 def _rms(values: Floats) -> float:
