@@ -10,6 +10,7 @@ from rich.table import Table
 
 from calibeam.console import Console
 from calibeam.prove.loop import prove_loop, summary
+from calibeam.prove.page import hidden_words, said_words
 from calibeam.prove.prove import Plan, prove
 from calibeam.prove.raised import TROUBLES
 from calibeam.prove.record import CaseScore, ProofFile
@@ -24,7 +25,9 @@ from calibeam.prove.tally import (
     by_effect,
     by_enr,
     by_fault,
+    by_motion,
     by_trouble,
+    faults,
     figures,
 )
 from calibrate.errors import DataError
@@ -121,16 +124,24 @@ def prove_command(
 
 
 def _print_proof(console: Console, proof: ProofFile) -> None:
-    """All sums; each case stands in the file and on the page."""
+    """All sums; each case stands in the file and on the page. Of motions, those with a fault come first."""
     cases = proof.cases
-    console.print(_lines("one hidden effect, by effect over noise", by_enr(cases)))
-    console.print(_lines("effect over noise >= 0.6, by instrument", by(cases, lambda c: c.family)))
-    console.print(_lines("effect over noise >= 0.6, by the way of the recording", by(cases, lambda c: c.path)))
-    console.print(_lines("several at once", [at_once(cases, "three"), at_once(cases, "eighteen")]))
-    console.print(_lines("effect over noise >= 0.6, by mechanism", by_effect(cases)))
-    console.print(_lines("faults of motion, stamps and second encoders, in streams", by_fault(cases)))
-    if found := between_encoders(cases):
-        console.print(_lines("between the two encoders of a joint", found))
+    for case in cases:
+        if case.kind == "motion" and (wrong := faults(case)):
+            words = f"{case.name}: hidden {hidden_words(case)}; reported {said_words(case)}: {'; '.join(wrong)}"
+            console.print(words, markup=False, highlight=False)
+    for title, lines in (
+        ("one hidden effect, by effect over noise", by_enr(cases)),
+        ("effect over noise >= 0.6, by instrument", by(cases, lambda c: c.family)),
+        ("effect over noise >= 0.6, by the way of the recording", by(cases, lambda c: c.path)),
+        ("several at once", [at_once(cases, "three"), at_once(cases, "eighteen")]),
+        ("effect over noise >= 0.6, by mechanism", by_effect(cases)),
+        ("faults of motion, stamps and second encoders, in streams", by_fault(cases)),
+        ("between the two encoders of a joint", between_encoders(cases)),
+        ("torques of recorded motions", by_motion(cases)),
+    ):
+        if any(line.located.n for line in lines):
+            console.print(_lines(title, lines))
     if troubles := by_trouble(cases):
         console.print(_troubles(troubles))
     console.print(_figures(cases))

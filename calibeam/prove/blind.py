@@ -36,14 +36,18 @@ def answer(recording: Path, asked: Path, out: Path, simulation: Path) -> None:
     from acquisition.recording.files import write_json
     from calibeam.prove.unseen import read_asked, tool_at, write_unseen
     from calibeam.results.comparison import compare
-    from calibeam.results.diagnosis import diagnose_recording
+    from calibeam.results.diagnosis import diagnose_recording, diagnose_streams
     from calibrate.diagnose.record.file import write_diagnosis
 
     out.mkdir(parents=True, exist_ok=True)
     if simulation.is_dir():
         write_json(out / "compare.json", compare(read(recording), read(simulation)))
         return
-    found, file = diagnose_recording(read(recording))
+    content = read(recording)
+    if not len(content.samples):  # a motion
+        write_diagnosis(out / "diagnosis.json", diagnose_streams(content))
+        return
+    found, file = diagnose_recording(content)
     write_diagnosis(out / "diagnosis.json", file)
     if found.physics is None or not asked.is_file():
         return

@@ -22,6 +22,7 @@ from calibeam.devices.site import addresses_of, connected
 from calibeam.emulation import EmulationError
 from calibeam.outcome import PartialResult
 from calibeam.printing.progress import progress_bar
+from calibeam.prove.motion_recording import record_motion, record_wired_motion
 from calibeam.prove.record import PLAIN
 from calibeam.prove.scenario import DRAWS, WIRED_DRAWS, Mix, Scenario, scenario, wired_scenario
 from calibeam.prove.seal import Layout, fingerprint, new_key, seal_truth
@@ -203,6 +204,9 @@ def publish(layout: Layout, cases: Sequence[Concealed], before: str = "") -> str
 
 
 def _conceal(order: _Order) -> Concealed:
+    first = (wired_scenario if order.wired else scenario)(order.mix, order.seed, order.number, 0)
+    if first.kind == "motion":
+        return _conceal_motion(order)
     drawn, case, simulated, attempts = _drawn(order)
     truth = truth_document(case)
     if drawn.wanted.beside == "constants":
@@ -216,10 +220,29 @@ def _conceal(order: _Order) -> Concealed:
         write_recording(simulated, order.layout.simulation(drawn.name))
     text = json.dumps(truth).encode()
     write_asked(truth["free_space"], order.layout.asked(drawn.name))
+    return _sealed(order, drawn, text, attempts)
+
+
+def _conceal_motion(order: _Order) -> Concealed:
+    """An arm in motion; over wires, where a busy machine may end a recording early, some attempts."""
+    last: ConcealError | None = None
+    for attempt in range(WIRED_DRAWS if order.wired else 1):
+        drawn = (wired_scenario if order.wired else scenario)(order.mix, order.seed, order.number, attempt)
+        path = order.layout.recorded(drawn.name)
+        try:
+            truth = record_wired_motion(drawn.wanted, path) if order.wired else record_motion(drawn.wanted, path)
+        except ConcealError as reason:
+            last = reason
+            continue
+        return _sealed(order, drawn, json.dumps(truth).encode(), attempt)
+    raise ConcealError(f"case {order.number}: no draw gave a motion; the last one: {last}")
+
+
+def _sealed(order: _Order, drawn: Scenario, truth: bytes, attempts: int) -> Concealed:
     seal = order.layout.seal(drawn.name)
     seal.parent.mkdir(parents=True, exist_ok=True)
-    seal.write_bytes(seal_truth(text, order.key))
-    return Concealed(drawn, fingerprint(text), order.key, attempts)
+    seal.write_bytes(seal_truth(truth, order.key))
+    return Concealed(drawn, fingerprint(truth), order.key, attempts)
 
 
 def _drawn(order: _Order) -> tuple[Scenario, Case, Case | None, int]:

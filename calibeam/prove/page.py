@@ -18,6 +18,7 @@ from calibeam.prove.tally import (
     by_effect,
     by_enr,
     by_fault,
+    by_motion,
     faults,
     figures,
     plain,
@@ -77,7 +78,7 @@ def _faulty(cases: Sequence[CaseScore]) -> str:
     return f"{wrong} of {len(cases)} cases have at least one fault of the diagnosis; they come first."
 
 
-SINGLE = ("one", "disturbed", "outside", "streams")
+SINGLE = ("one", "disturbed", "outside", "streams", "motion")
 NOTHING = "nothing"
 FAILED = "failed"
 OTHER_PLACE = "right name, elsewhere"
@@ -90,7 +91,7 @@ def confusion(cases: Sequence[CaseScore]) -> tuple[list[str], list[str], NDArray
     """Names hidden, names reported, counts. Of cases with none or one cause; several at once have no single answer."""
     pairs: Counter[tuple[str, str]] = Counter()
     for case in cases:
-        if case.kind in SINGLE and case.defects and case.defects[0].enr >= PLAIN:
+        if case.kind in SINGLE and len(case.defects) == 1 and case.defects[0].enr >= PLAIN:
             pairs[case.defects[0].physics, _said(case)] += 1
         elif not case.defects:
             pairs[NOTHING, _said(case)] += 1
@@ -209,6 +210,7 @@ def _sums(cases: Sequence[CaseScore]) -> Html:
         *_lines("By instrument, effects of 0.6 times the noise and more", by(cases, lambda c: c.family)),
         *_lines("The same, by the way that the recording came", by(cases, lambda c: c.path)),
         *_lines("Several at once", several),
+        *_lines("Torques of recorded motions", by_motion(cases)),
         *_lines("Faults of motion, stamps and second encoders, found in streams", by_fault(cases)),
         *_lines("By mechanism, effects of 0.6 times the noise and more", by_effect(cases)),
     )
@@ -222,6 +224,8 @@ def _uncertainty(cases: Sequence[CaseScore]) -> Html:
 
 def _confusion(cases: Sequence[CaseScore]) -> Html:
     lead = "Hidden physics in rows, the first finding in columns; cases with one cause of 0.6 times the noise, or none."
+    if not confusion(cases)[0]:
+        return section("confusion", CONTENTS["confusion"], "No case has one cause, or none.")
     drawing = figure(confusion_figure(cases), "On the diagonal: right. Beside it: taken for another cause.")
     return section("confusion", CONTENTS["confusion"], lead, drawing)
 
@@ -272,14 +276,7 @@ def _story(case: CaseScore) -> Html:
         f"Reported: {said_words(case)}.",
     ]
     lines += [s.says for s in case.said]
-    lines.append(
-        f"Unseen samples: {_m(case.held_out_before_m)} with geometry alone, {_m(case.held_out_after_m)} with what was "
-        f"found; noise {_m(case.floor_m)}."
-    )
-    lines.append(
-        f"Tool error over the workspace, against the truth: {_m(case.free_space_before_m)} before, "
-        f"{_m(case.free_space_after_m)} after."
-    )
+    lines += _unseen_torque(case) if case.kind == "motion" else _unseen(case)
     lines += [
         f"Size of {d.mechanism}: {s.name} {s.true:.3g}, reported {s.said:.3g} ± {s.sigma:.2g}."
         for d in case.defects
@@ -287,6 +284,20 @@ def _story(case: CaseScore) -> Html:
     ]
     lines += [f"{d.mechanism}: place taken as right, for {d.equivalent}." for d in case.defects if d.equivalent]
     return folded(title, bullets(lines))
+
+
+def _unseen_torque(case: CaseScore) -> list[str]:
+    left = case.torque_over_noise
+    return [] if left is None else [f"Torque left on the unseen end of the motion: {left:.2f} times the noise."]
+
+
+def _unseen(case: CaseScore) -> list[str]:
+    return [
+        f"Unseen samples: {_m(case.held_out_before_m)} with geometry alone, {_m(case.held_out_after_m)} with what was "
+        f"found; noise {_m(case.floor_m)}.",
+        f"Tool error over the workspace, against the truth: {_m(case.free_space_before_m)} before, "
+        f"{_m(case.free_space_after_m)} after.",
+    ]
 
 
 def _repeat(proof: ProofFile) -> Html:

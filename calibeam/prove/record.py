@@ -98,6 +98,7 @@ class CaseScore(ProofRecord, frozen=True):
     path: str = "in process"  # or "on wires": how the recording came about
     trouble: str = ""  # of the kind `raised`
     holds: bool | None = None  # what a trouble asks beside its cause; None: nothing
+    torque_over_noise: float | None = None  # of a motion: torque left on its unseen end, over the noise that was added
 
     @property
     def alarmed(self) -> bool:
@@ -166,10 +167,11 @@ class Truth(msgspec.Struct, frozen=True):
 
     wanted: dict[str, Any]
     defects: tuple[TrueDefect, ...]
-    withheld: tuple[str, ...]
-    noise: TrueNoise
-    exact: Exact
-    free_space: FreeSpace
+    withheld: tuple[str, ...] = ()
+    noise: TrueNoise = TrueNoise("white", 0.0, 0.0)
+    exact: Exact = Exact([])  # this and the last are of samples: a recorded motion has none
+    free_space: FreeSpace = FreeSpace()
+    torque_sigma_nm: tuple[float, ...] = ()  # of a motion: one sigma of a reading, of each joint
 
 
 def truth_of(content: bytes, without: Sequence[str] = ()) -> Truth:

@@ -36,6 +36,8 @@ from calibrate.diagnose.record.file import read_diagnosis
 from calibrate.diagnose.record.schema import DiagnosisFile, FindingRecord, NameRecord
 from calibrate.fit.noise import sigma_about_zero
 from calibrate.model.alignment import aligned_difference
+from simulators.conceal.motion.driving import RATE_HZ
+from simulators.world.model import STEP_S
 
 
 @dataclass(frozen=True)
@@ -165,11 +167,19 @@ BAD_SHOT = "bad shot"
 OF_GEOMETRY = ("joint-zeros", "links")  # levels of a comparison
 REPLAY_AGREES = 2.0  # times the noise that was added
 TIED = 0.5  # of BIC: reported as equal
+MOTION, DELAY = "motion", "torque-delay"
+CONTROLLER_DELAY_S = 1.5 * STEP_S  # the middle of two steps, the newer of which began a step ago
+BAND_HZ = 20.0  # of the low pass that a diagnosis of torques works behind: docs/motion-recordings.md
+# Of white noise, by a fourth-order Butterworth low pass run both ways: the integral of 1 / (1 + x^8)^2 from 0 on is
+# 0.898, a share of 0.898 of the band.
+PASSED = float(np.sqrt(2.0 * 0.898 * BAND_HZ / RATE_HZ))
 
 
 def score(layout: Layout, concealed: Concealed, answered: Answered, truth: Truth) -> CaseScore:
     """Of an opened seal and an answer; a diagnosis that did not end has reported nothing."""
     drawn, wanted = concealed.scenario, concealed.scenario.wanted
+    if drawn.kind == "motion":
+        return _motion_score(layout, concealed, answered, truth)
     file, constants = (None, ()) if answered.error else _answer(layout, drawn)
     own = _own(truth.defects, constants if file is None else (*file.findings, *constants), wanted.family)
     left = _left_over(file)
@@ -213,6 +223,64 @@ def score(layout: Layout, concealed: Concealed, answered: Answered, truth: Truth
         trouble=drawn.trouble,
         holds=_holds(layout, concealed, truth, file, defects),
     )
+
+
+def _motion_score(layout: Layout, concealed: Concealed, answered: Answered, truth: Truth) -> CaseScore:
+    """Of torques: no samples, no tool, and a joint in the place of an instrument."""
+    drawn, wanted = concealed.scenario, concealed.scenario.wanted
+    recording = read(layout.recording(drawn.name))
+    file = None if answered.error else read_diagnosis(layout.answer(drawn.name) / "diagnosis.json")
+    if file is not None and drawn.path == "on wires":
+        file = replace(file, findings=tuple(f for f in file.findings if not _of_controller(f, truth)))
+    own, left = _own(truth.defects, () if file is None else file.findings, MOTION), _left_over(file)
+    defects = tuple(_defect(d, f, left, MOTION) for d, f in zip(truth.defects, own, strict=True))
+    return CaseScore(
+        name=drawn.name,
+        sha256=concealed.sha256,
+        kind=drawn.kind,
+        family=wanted.arm or "",
+        places=0,
+        samples=max(len(stream.host_s) for stream in recording.streams.values()),
+        noise=wanted.noise,
+        seed=wanted.seed,
+        enr_wanted=0.0,
+        attempts=concealed.attempts,
+        withheld=(),
+        verdict=FAILED if file is None else file.verdict,
+        defects=defects,
+        said=() if file is None else tuple(_said(f, truth, MOTION) for f in file.findings),
+        unexplained=file is not None and file.unexplained is not None,
+        asks_for=False,
+        held_out_before_m=None,
+        held_out_after_m=None,
+        floor_m=None,
+        free_space_before_m=None,
+        free_space_after_m=None,
+        cpu_s=answered.cpu_s,
+        error=answered.error,
+        path=drawn.path,
+        torque_over_noise=None if file is None else torque_over_noise(file, truth.torque_sigma_nm),
+    )
+
+
+def _of_controller(finding: FindingRecord, truth: Truth) -> bool:
+    """The emulated controller reports the mean torque of its last cycle with the angles of that cycle's end. That delay
+    is truly there, at every joint, and no hidden mechanism.
+    """
+    delay = finding.parameters.get("delay_s")
+    if finding.physics != DELAY or delay is None or delay.value is None or not delay.sigma:
+        return False
+    late = any((d.physics, d.port) == (DELAY, finding.where) for d in truth.defects)
+    return not late and abs(delay.value - CONTROLLER_DELAY_S) < CONTROLLER_DELAY_S
+
+
+def torque_over_noise(file: DiagnosisFile, sigma_nm: Sequence[float]) -> float | None:
+    """Rms over the joints of the torque left on the unseen end, each over the noise that its low pass lets through."""
+    joints = () if file.torques is None else file.torques.joints
+    ratios = [
+        one.unseen_after_nm / (sigma_nm[one.joint - 1] * PASSED) for one in joints if one.unseen_after_nm is not None
+    ]
+    return float(np.sqrt(np.mean(np.square(ratios)))) if ratios else None
 
 
 def _answer(layout: Layout, drawn: Scenario) -> tuple[DiagnosisFile | None, tuple[FindingRecord, ...]]:

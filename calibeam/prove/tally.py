@@ -164,6 +164,62 @@ def by_fault(cases: Sequence[CaseScore]) -> list[TallyLine]:
     return [_line(word, [c for c in ones if c.defects[0].mechanism == word]) for word in words]
 
 
+def by_motion(cases: Sequence[CaseScore]) -> list[TallyLine]:
+    """Torques of recorded motions: those that can be seen, those that cannot, and the former by arm, way and mechanism.
+
+    What is reported beside what is hidden is counted of all cases of a line.
+    """
+    moved = [c for c in cases if c.kind == "motion"]
+    groups = [(word, [c for c in moved if word in (c.family, c.path)]) for word in sorted(_words(moved))]
+    of_kinds = sorted({d.mechanism for d in _visible(moved)})
+    return [
+        _of(f"effect over noise >= {PLAIN:g}", _visible(moved), _others(moved)),
+        _of(f"below {PLAIN:g}", [d for c in moved for d in c.defects if d.enr < PLAIN], None),
+        *(_of(word, _visible(some), _others(some)) for word, some in groups),
+        *(_of(kind, [d for d in _visible(moved) if d.mechanism == kind], None) for kind in of_kinds),
+    ]
+
+
+def _words(cases: Sequence[CaseScore]) -> set[str]:
+    return {word for c in cases for word in (c.family, c.path)}
+
+
+def _visible(cases: Sequence[CaseScore]) -> list[DefectScore]:
+    return [d for c in cases for d in c.defects if d.enr >= PLAIN]
+
+
+def _others(cases: Sequence[CaseScore]) -> float | None:
+    """Findings where nothing is hidden, a case."""
+    return float(np.mean([sum(not s.placed for s in c.said) for c in cases])) if cases else None
+
+
+def of_motion(cases: Sequence[CaseScore]) -> list[ProofFigure]:
+    """Of recorded motions; nothing where there are none."""
+    moved = [c for c in cases if c.kind == "motion"]
+    if not moved:
+        return []
+    outside = [d for d in _visible(moved) if d.physics == UNKNOWN]
+    sizes = [s.inside for c in moved for d in c.defects for s in d.sizes]
+    left = [c.torque_over_noise for c in moved if c.torque_over_noise is not None]
+    return [
+        ProofFigure(
+            "motion: nothing hidden, nothing found", str(share(not c.alarmed for c in _quiet(moved))), ">= 94 %"
+        ),
+        ProofFigure(
+            "motion: no catalogue lists it, unknown at its joint",
+            str(share(d.unknown_there for d in outside)),
+            ">= 90 %",
+        ),
+        ProofFigure("motion: stated sizes within 1.96 sigma", str(share(sizes)), "93 - 97 %"),
+        ProofFigure("motion: unseen torque over noise, median and p90", percentiles(left), "<= 1.05, 1.15"),
+        ProofFigure("motion: findings where nothing is hidden, a case", f"{_others(moved):.2f}", "<= 0.1"),
+    ]
+
+
+def _quiet(cases: Sequence[CaseScore]) -> list[CaseScore]:
+    return [c for c in cases if not c.defects]
+
+
 def figures(cases: Sequence[CaseScore]) -> list[ProofFigure]:
     """The rest of what was promised."""
     null = [c for c in cases if c.kind == "none"]
@@ -180,6 +236,7 @@ def figures(cases: Sequence[CaseScore]) -> list[ProofFigure]:
     return [
         *out,
         ProofFigure("faint (0.15 - 0.3): what is named is right", str(share(s.right for s in faint)), "all"),
+        *of_motion(cases),
         *_calibration(cases),
         ProofFigure("outside: place right", str(share(c.defects[0].located for c in outside)), ">= 90 %"),
         ProofFigure("outside: reported as unknown", str(share(_said_unknown(c) for c in outside)), ">= 90 %"),
@@ -227,6 +284,8 @@ def faults(case: CaseScore) -> list[str]:
     if not case.defects:
         return out + (["false alarm"] if case.alarmed else [])
     out += [f"misnamed with confidence: {s.physics} at {s.where}" for s in case.said if s.misnamed]
+    if case.kind == "motion":
+        out += [f"nothing is hidden there: {s.physics} at {s.where}" for s in case.said if not (s.placed or s.misnamed)]
     if case.kind == "withheld":
         return out + ([] if case.asks_for else ["does not name the missing column"])
     for d in case.defects:

@@ -2,7 +2,7 @@
 
 `MECHANISMS` are what a concealed session draws from. `RAISED` were met on real robots, are drawn only where they are
 asked for by name, and have no part in the moving world of the emulators. `GIVEN` are those that have their numbers from
-a model or from a person, and that no session draws.
+a model, from a person, or from the concealed proof of torques, and that no session of poses draws.
 
 As plain values: [{"mechanism": "soft-joint", "fields": {...}}, ...], as a revealed truth lists them.
 """
@@ -22,6 +22,7 @@ from simulators.defects import (
     found_curve,
     link,
     outside,
+    outside_torque,
     tool,
     torque,
     tracker,
@@ -129,6 +130,9 @@ GIVEN: tuple[type[Defect], ...] = (
     torque.WrongTorqueConstant,
     torque.TorqueOffset,
     torque.LateTorque,
+    outside_torque.BentSeal,
+    outside_torque.ShortHose,
+    outside_torque.WornOutputWheel,
 )
 
 

@@ -19,24 +19,23 @@ What it does not imitate: dependence on direction, load or distance (that is bac
 """
 
 import math
+from collections import deque
 from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import NDArray
 
 from simulators.defects.defect import Shafts
-from simulators.wire import TICK_S
-from simulators.world.model import STEP_S, build_mjcf, torque_limits_nm
+from simulators.world.model import STEP_S, STEPS_PER_COMMAND, build_mjcf, torque_limits_nm
 from simulators.world.moving_mechanisms import Exposure, MovingMechanisms
 from simulators.world.optics import Ray
 from simulators.world.rig import WorldRig
 from simulators.world.servo import STIFFNESS, Engine, Servo
-from simulators.world.torque_mechanisms import TorqueMechanisms
+from simulators.world.torque_mechanisms import TorqueMechanisms, mean_of_cycles
 from simulators.world.truth import Truth
 
 Floats = NDArray[np.float64]
 TOP_SPEED_RAD_S = math.pi  # 180 deg/s: UR5e technical details, every joint
-STEPS_PER_COMMAND = round(TICK_S / STEP_S)
 
 
 class Reference:
@@ -152,6 +151,7 @@ class ArmBody:
         self._engine.qpos[self._at] = q_rad + self._offset_rad()
         self._engine.refresh()
         self._servo.drive(np.zeros(n), np.zeros(n))
+        self._given_nm: deque[Floats] = deque([self._servo.torque_nm], maxlen=STEPS_PER_COMMAND)
         if torques is not None:
             torques.given(self._servo.torque_nm)
         self.stands = torques is None or not torques.acting
@@ -172,6 +172,7 @@ class ArmBody:
         error_rad = self._reference.q_rad + self._offset_rad() - self.true_rad()
         error_rad_s = self._reference.qd_rad_s - self.speed_rad_s()
         self._servo.drive(error_rad, error_rad_s)
+        self._given_nm.append(self._servo.torque_nm)
         if self._torques is not None:
             self._load_joints(self._torques)
         self._engine.step()
@@ -220,8 +221,8 @@ class ArmBody:
         return self._engine.qvel[self._driven]
 
     def torque_nm(self) -> Floats:
-        """As the drives report them."""
-        return self._servo.torque_nm if self._torques is None else self._torques.reported_nm()
+        """As the drives report them, in the mean of the last cycle: 1.5 ms older than the readings."""
+        return mean_of_cycles(self._given_nm)[-1] if self._torques is None else self._torques.reported_nm()
 
     def mass_matrix_kg_m2(self, q_rad: Floats) -> Floats:
         """(n, n) of the links and the tool at the readings `q_rad` (n,), without the rotors."""

@@ -12,10 +12,12 @@ from xml.etree import ElementTree
 
 import msgspec
 
+from simulators.wire import TICK_S
 from simulators.world.rig import ArmOfRig, Joint, Pose, Tool, Vector, WorldRig
 from simulators.world.truth import TrueLink, Truth, arm_of
 
 STEP_S = 0.001  # physics step; an e-Series joint controller closes its position loop at about this rate
+STEPS_PER_COMMAND = round(TICK_S / STEP_S)  # of the controller's cycle
 NO_MASS_KG = 1e-4  # stands for a mass that the rig does not give: nothing beside the armature, but MuJoCo wants some
 CASTING_KG_M3 = 1350.0  # aluminium (2700) about half hollow: the size of a link follows from its mass
 TORQUE_FLOOR_NM = 28.0  # UR5e wrist joints; Universal Robots, "Max. joint torques", article 17260
@@ -93,17 +95,21 @@ def _add_frame(parent: ElementTree.Element, name: str, pose: Pose) -> ElementTre
 
 
 def _add_inertia(frame: ElementTree.Element, mass_kg: float, com_m: Vector, reach_m: float) -> None:
-    """A solid ball of the link's mass plus a slender rod as long as the link reaches.
-
-    2/5 m r^2 and m l^2/12 (any mechanics textbook). No data sheet gives the tensor; only the motion between two
-    stands depends on it, and the computed-torque servo knows it exactly.
-    """
+    """No data sheet gives the tensor; only the motion between two stands depends on it, and the servo knows it."""
     mass = max(mass_kg, NO_MASS_KG)
-    radius_m = (3.0 * mass / (4.0 * math.pi * CASTING_KG_M3)) ** (1.0 / 3.0)
-    inertia = 0.4 * mass * radius_m**2 + mass * reach_m**2 / 12.0
+    inertia = inertia_kg_m2(mass, reach_m)
     ElementTree.SubElement(
         frame, "inertial", pos=_numbers(*com_m), mass=repr(mass), diaginertia=_numbers(inertia, inertia, inertia)
     )
+
+
+def inertia_kg_m2(mass_kg: float, reach_m: float) -> float:
+    """About any axis through the centre of mass: a solid ball plus a slender rod as long as the link reaches.
+
+    2/5 m r^2 and m l^2/12 (any mechanics textbook).
+    """
+    radius_m = (3.0 * mass_kg / (4.0 * math.pi * CASTING_KG_M3)) ** (1.0 / 3.0)
+    return 0.4 * mass_kg * radius_m**2 + mass_kg * reach_m**2 / 12.0
 
 
 def torque_limits_nm(arm: ArmOfRig, tool: Tool) -> tuple[float, ...]:

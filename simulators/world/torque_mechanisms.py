@@ -14,7 +14,7 @@ from msgspec import structs
 from numpy.typing import NDArray
 
 from simulators.defects.defect import ChangesMasses, Defect, Masses, PullsAtJoint, ReportsTorque, RubsAtJoint, Shafts
-from simulators.world.model import STEP_S
+from simulators.world.model import STEP_S, STEPS_PER_COMMAND
 from simulators.world.rig import WorldRig
 
 Floats = NDArray[np.float64]
@@ -29,7 +29,7 @@ class TorqueMechanisms:
         self._pulling = [d for d in defects if isinstance(d, PullsAtJoint)]
         self._reporting = [d for d in defects if isinstance(d, ReportsTorque)]
         late_s = max((float(getattr(d, "late_s", 0.0)) for d in self._reporting), default=0.0)
-        self._given_nm: deque[Floats] = deque(maxlen=math.ceil(late_s / STEP_S) + 1)
+        self._given_nm: deque[Floats] = deque(maxlen=math.ceil(late_s / STEP_S) + STEPS_PER_COMMAND)
         self._none: Floats = np.zeros(n_joints)
 
     @property
@@ -52,11 +52,22 @@ class TorqueMechanisms:
         self._given_nm.append(torque_nm)
 
     def reported_nm(self) -> Floats:
-        """Of the present step."""
-        given_nm = np.array(self._given_nm)
+        """Of the last cycle of the controller, in the mean."""
+        given_nm = mean_of_cycles(self._given_nm)
         for defect in self._reporting:
             given_nm = defect.reported_torque_nm(given_nm, STEP_S)
         return given_nm[-1]
+
+
+def mean_of_cycles(given_nm: Sequence[Floats]) -> Floats:
+    """(step, n) of torques (step, n): each the mean of the cycle that ends with it.
+
+    The set-point moves on once a cycle, and the servo answers in its first step more than in its last: a single step
+    would show the acceleration wrong by a seventh. A current loop averages over its cycle, too.
+    """
+    given = np.array(given_nm)
+    cycle = min(STEPS_PER_COMMAND, len(given))
+    return np.mean([given[k : len(given) - cycle + 1 + k] for k in range(cycle)], axis=0)
 
 
 def with_true_masses(rig: WorldRig, defects: Sequence[Defect]) -> WorldRig:

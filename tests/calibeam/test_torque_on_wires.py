@@ -9,6 +9,7 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -90,11 +91,18 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder / "motion.mcap"
 
 
+def of_controller(finding: dict[str, Any]) -> bool:
+    """The emulated controller reports the mean torque of its last cycle: it is truly 1.5 ms late, at every joint."""
+    if finding["physics"] != "torque-delay":
+        return False
+    return finding["parameters"]["delay_s"]["value"] == pytest.approx(1.5e-3, abs=0.7e-3)
+
+
 def test_dry_friction_is_named_at_its_joint_with_its_size(recorded: Path, tmp_path: Path) -> None:
     out = tmp_path / "diagnosis.json"
     assert run(["diagnose", str(recorded), "--out", str(out)]) == 0
     said = json.loads(out.read_text(encoding="utf-8"))
-    found = [one for one in said["findings"] if one["share"] > 0.01]
+    found = [one for one in said["findings"] if one["share"] > 0.01 and not of_controller(one)]
     assert [(one["physics"], one["where"]) for one in found] == [("coulomb-friction", "joint3.torque")]
     assert found[0]["parameters"]["friction_nm"]["value"] == pytest.approx(FRICTION_NM, rel=0.02)
 
