@@ -19,7 +19,6 @@ from benchmarks import (
     designed_poses,
     device_faults,
     diagnosis_speed,
-    drawn_motion,
     error_simulation,
     false_alarms,
     fleet,
@@ -125,12 +124,6 @@ def run_real() -> None:
     print("real recordings: unseen blocks by the model files of identify and diagnose")
     for row in real_diagnosis.lines(RIG.parents[2] / "shared" / "data"):
         print(row, flush=True)
-
-
-def run_drawn_motion() -> None:
-    print("torques of an arm in motion with mechanisms put in at random, by MuJoCo; noise 0.1 to 1 Nm")
-    for row in drawn_motion.lines(range(60), range(20)):
-        print(row)
 
 
 def run_motion() -> None:
@@ -303,7 +296,6 @@ BENCHMARKS: dict[str, Callable[[], None]] = {
     "errors": run_errors,
     "designed_poses": run_designed_poses,
     "real": run_real,
-    "drawn_motion": run_drawn_motion,
     "motion": run_motion,
     "panda_motion": run_panda_motion,
     "sockets": run_sockets,

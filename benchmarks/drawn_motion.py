@@ -1,9 +1,5 @@
-"""A UR5e in motion, by MuJoCo's inverse dynamics, with mechanisms that are put in by plain laws and drawn at random.
+"""A UR5e in motion, by MuJoCo's inverse dynamics, with mechanisms that are put in by plain laws, for tests."""
 
-What is found of them: at its place, by its name, within its sigma; whether it could be seen at all is not asked.
-"""
-
-from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,7 +10,6 @@ from scipy.spatial.transform import Rotation
 
 from acquisition.recording import Channel, Recording, Samples, Stream
 from acquisition.recording.rig import load_rig
-from calibrate.diagnose.motion import diagnose_torques
 from calibrate.model.arms.catalogue import arm_of
 from calibrate.model.parameters import start_values
 
@@ -153,87 +148,3 @@ def recorded(hidden, seed=1, length_s=20.0, noise_nm=TORQUE_NOISE_NM):
     values = {"actual_q_rad": q, "joint_torque_nm": torque}
     stream = Stream("robot", channels, t, t, np.arange(len(t)), values)
     return Recording(Path("motion"), "", rig, Samples({"t_s": np.zeros(0)}, n), True, streams={"robot": stream})
-
-
-# of each kind the physics, and the range of its size
-KINDS: Mapping[str, tuple[str, float, float]] = {
-    "coulomb": ("coulomb-friction", 0.2, 5.0),
-    "viscous": ("viscous-friction", 0.5, 15.0),
-    "loaded": ("load-friction", 0.03, 0.2),
-    "spring": ("joint-spring", 0.5, 5.0),
-    "scale": ("torque-constant", 0.02, 0.1),
-    "offset": ("torque-offset", 0.2, 2.0),
-    "delay": ("torque-delay", 0.002, 0.02),
-}
-NOISES_NM = (0.1, 0.3, 1.0)
-SOMETIMES = 0.2  # a payload, a leaning base
-FIRST_SEED = 1000
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """Of one mechanism that was put in."""
-
-    physics: str
-    located: bool
-    named: bool
-    within: bool  # 1.96 sigma of its size, where it was named
-
-
-def drawn(rng: np.random.Generator, joints: int = 6) -> tuple[Hidden, tuple[tuple[str, str, float], ...]]:
-    """One to three mechanisms, and physics, place and size of each."""
-    chosen = rng.choice(list(KINDS), rng.integers(1, 4), replace=False)
-    tables: dict[str, dict[int, float]] = {}
-    truth: list[tuple[str, str, float]] = []
-    for kind in chosen.tolist():
-        physics, least, most = KINDS[kind]
-        joint, size = int(rng.integers(1, joints + 1)), float(np.exp(rng.uniform(np.log(least), np.log(most))))
-        tables[kind] = {joint: size}
-        truth.append((physics, f"joint{joint}.torque", size))
-    payload_kg, lean_rad = 0.0, 0.0
-    if rng.random() < SOMETIMES:
-        payload_kg = float(rng.uniform(0.3, 3.0))
-        truth.append(("payload", "tool.load", payload_kg))
-    if rng.random() < SOMETIMES:
-        lean_rad = float(rng.uniform(0.003, 0.02))
-        truth.append(("gravity-direction", "base.lean", lean_rad))
-    return Hidden(**tables, payload_kg=payload_kg, lean_rad=(lean_rad, 0.0)), tuple(truth)
-
-
-def judged(seed: int) -> tuple[list[Outcome], int]:
-    """Of one drawn motion, and how many findings are of nothing that was put in."""
-    rng = np.random.default_rng(FIRST_SEED + seed)
-    hidden, truth = drawn(rng)
-    found = diagnose_torques(recorded(hidden, seed, noise_nm=float(rng.choice(NOISES_NM))), np.random.default_rng(1))
-    findings = () if found is None else found.diagnosis.findings
-    out: list[Outcome] = []
-    for physics, where, size in truth:
-        here = [f for f in findings if f.name.where == where]
-        mine = next((f for f in here if f.name.physics == physics), None)
-        first = None if mine is None else next(iter(mine.parameters.values()))
-        within = first is not None and abs(first.value - size) < 1.96 * first.sigma
-        out.append(Outcome(physics, bool(here), mine is not None, within))
-    places = {where for _, where, _ in truth}
-    return out, sum(f.name.where not in places for f in findings)
-
-
-def lines(seeds: range, quiet: range) -> Iterator[str]:
-    """A table by physics, then what was found of nothing."""
-    each = [judged(seed) for seed in seeds]
-    outcomes, others = [one for some, _ in each for one in some], sum(more for _, more in each)
-    yield f"{len(seeds)} motions of 20 s with {len(outcomes)} mechanisms, seeds from {FIRST_SEED + seeds.start}"
-    yield "| physics | put in | located | named | size within 1.96 sigma |"
-    yield "|---|---|---|---|---|"
-    for physics in ("", *sorted({one.physics for one in outcomes})):
-        mine = [one for one in outcomes if physics in ("", one.physics)]
-        named = [one for one in mine if one.named]
-        yield (
-            f"| {physics or 'all'} | {len(mine)} | {sum(one.located for one in mine)} | {len(named)} | "
-            f"{sum(one.within for one in named)} |"
-        )
-    yield f"findings of nothing that was put in: {others / max(len(seeds), 1):.2f} a motion"
-    alarms = 0
-    for seed in quiet:
-        found = diagnose_torques(recorded(Hidden(), seed), np.random.default_rng(1))
-        alarms += found is not None and bool(found.diagnosis.findings)
-    yield f"motions without any: {alarms} of {len(quiet)} with a finding"

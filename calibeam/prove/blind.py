@@ -45,7 +45,7 @@ def answer(recording: Path, asked: Path, out: Path, simulation: Path) -> None:
         return
     content = read(recording)
     if not len(content.samples):  # a motion
-        write_diagnosis(out / "diagnosis.json", diagnose_streams(content))
+        write_diagnosis(out / "diagnosis.json", diagnose_streams(content)[1])
         return
     found, file = diagnose_recording(content)
     write_diagnosis(out / "diagnosis.json", file)
