@@ -21,12 +21,14 @@ from calibrate.compare.comparison_file import (
 from calibrate.compare.mismatches import LACKING, SIDES
 from calibrate.diagnose.assess import Finding, Verdict
 from calibrate.diagnose.motion import TorqueDiagnosis
+from calibrate.model.effects.term import Size
 from calibrate.model.effects.torque import masses_and_springs
 from calibrate.model.parameters import start_values
 from calibrate.model.torque_records import TorquesOfModel
 
 Floats = NDArray[np.float64]
 
+LINKS = "links"  # place of what several links could hold
 NO_SAMPLES = "Samples were not compared: give a recording of the simulation, --simulator or --simulated-model, too."
 
 
@@ -35,7 +37,7 @@ def torques_compared(
 ) -> ComparisonFile:
     """The comparison of `samples`, where one was made, with that of the torques. `found`: beside what is `known`."""
     file = _nothing(measured, known, software) if samples is None else samples
-    differ = [_of_finding(one, known) for one in found.diagnosis.findings]
+    differ = [*(_of_finding(one, known) for one in found.diagnosis.findings), *_of_links(found, known.source)]
     left = [
         Mismatch(Level.UNEXPLAINED, u.where, "unknown", {}, f"Torque is left over at {u.where}: {u.why}", p=u.p)
         for u in found.diagnosis.unexplained
@@ -91,7 +93,7 @@ def _says(verdict: Verdict, count: int, source: str) -> str:
         return f"The torques measured and those of {source} differ: {many}."
     if verdict is Verdict.UNDECIDABLE:
         return f"The torques measured hold something beside those of {source} that has no name."
-    return f"The torques measured and those of {source} agree to within the noise and the tolerance of its masses."
+    return f"The torques measured and those of {source} agree to within the noise."
 
 
 def _of_finding(finding: Finding, known: TorquesOfModel) -> Mismatch:
@@ -117,6 +119,21 @@ def _side(finding: Finding, known: TorquesOfModel) -> Side:
     if abs(stated) < LACKING * abs(more):
         return Side.MEASURED
     return Side.SIMULATED if abs(stated + more) < LACKING * abs(more) else Side.BOTH
+
+
+def _of_links(found: TorqueDiagnosis, source: str) -> list[Mismatch]:
+    """One line where fitted numbers of links and rotors change the torque of a joint by more than its noise."""
+    model = found.model
+    change = model.problem.columns @ (model.links - start_values(model.problem.links))
+    sizes = [_rms(change[model.problem.joint == j]) for j in range(len(model.problem.sigma_nm))]
+    j = int(np.argmax(sizes / model.problem.sigma_nm))
+    if sizes[j] <= model.problem.sigma_nm[j]:
+        return []
+    says = (
+        f"Masses, centres, inertias or rotors differ from those of {source}: {sizes[j]:.2g} Nm rms at joint "
+        f"{j + 1}; which number of which link is not determined, because only combinations of them act on the joints"
+    )
+    return [Mismatch(Level.EFFECTS, LINKS, "link-mass", {"torque_nm": Size(sizes[j], float("nan"))}, says)]
 
 
 def _joints(found: TorqueDiagnosis) -> tuple[ComparedJoint, ...]:

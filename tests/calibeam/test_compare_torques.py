@@ -17,12 +17,14 @@ ARMATURE = f'armature="{ROTOR_KG_M2}"'
 IMPORTED = "q1..q6 [rad] = q, tau1..tau6 [Nm] = tau"
 
 
-def simulation(folder, joint=lambda number: ARMATURE):
+def simulation(folder, joint=lambda number: ARMATURE, second=1.0):
     """The MJCF file of the arm that `recorded` moves."""
     rig = rig_of_test()
     arm = arm_of(rig)
     frames = arm.frames(start_values(arm.parameters), np.zeros((1, 6)))[0]
-    model = in_mujoco(frames, links_of(rig), np.array(rig.arm.gravity_m_s2), joint)
+    links = links_of(rig)
+    links[1] *= second
+    model = in_mujoco(frames, links, np.array(rig.arm.gravity_m_s2), joint)
     path = folder / "arm.xml"
     mujoco.mj_saveLastXML(str(path), model)
     return path
@@ -56,6 +58,15 @@ def test_a_simulation_with_all_that_the_arm_has_agrees(tmp_path):
     assert file.verdict == "consistent", file.says
     assert all(one.difference_nm < 0.1 for one in file.torques.joints)
     assert all(one.measured_nm > 5.0 for one in file.torques.joints[1:3])
+
+
+def test_a_mass_of_the_simulation_that_is_off_is_a_difference_without_a_number_of_a_link(tmp_path):
+    file = compare_torques(recorded(Hidden()), simulation(tmp_path, second=0.97), None)
+    assert file.verdict == "mismatch"
+    assert named(file) == {("link-mass", "links", "")}
+    (one,) = (d for d in file.differences if d.decides)
+    assert "joint 2" in one.says
+    assert abs(one.sizes["torque_nm"].value - file.torques.joints[1].difference_nm) < 0.02
 
 
 def test_a_log_without_samples_by_the_command(tmp_path, capsys):
