@@ -11,12 +11,17 @@ from calibeam.console import Console
 from calibeam.outcome import CheckFailed
 from calibeam.overwriting import writes
 from calibeam.printing.comparison_lines import print_comparison
-from calibeam.results.comparison import compare
+from calibeam.results.comparison import compare, compare_torques
 from calibeam.results.identification import naming_source
 from calibeam.results.simulator import TIMEOUT_S, Simulator, simulated_by
 from calibrate.diagnose.assess import Verdict
 from calibrate.errors import DataError
 from calibrate.model.model_file import ModelFile, read_model
+
+NO_SIMULATION = (
+    "no simulation: give a recording of it, --simulator COMMAND or --simulated-model MODEL; of a recording in motion "
+    "--simulation FILE"
+)
 
 
 @writes(out=json_output("calibeam-comparison"))
@@ -26,6 +31,7 @@ def compare_command(
     *,
     simulator: str | None = None,
     simulated_model: Path | None = None,
+    simulation: Path | None = None,
     timeout_s: float = TIMEOUT_S,
     out: Path = Path("compare.json"),
     diagnose: bool = True,
@@ -57,6 +63,9 @@ def compare_command(
     simulated_model
         The model that the simulation is made of: its values stand beside the differences. Without a recording and
         without a program it is the simulation.
+    simulation
+        A URDF or MJCF file of the arm, for a recording in motion: its torques are taken along the measured motion, and
+        what they leave out is found. Alone, or beside one of the above, to which samples are compared.
     timeout_s
         How long the program may take.
     out
@@ -76,7 +85,11 @@ def compare_command(
     structure = None if simulated_model is None else read_model(simulated_model)
     with naming_source(measured):
         other = _simulation(source, simulated, simulator, structure, timeout_s)
-        file = compare(source, other, diagnosed=diagnose, structure=structure)
+        file = None if other is None else compare(source, other, diagnosed=diagnose, structure=structure)
+        if simulation is not None:
+            file = compare_torques(source, simulation, file)
+    if file is None:
+        raise DataError(NO_SIMULATION)
     write_json(out, file)
     if json:
         print(msgspec.json.encode(file).decode())
@@ -90,14 +103,12 @@ def compare_command(
 
 def _simulation(
     measured: Recording, recording: Path | None, program: str | None, structure: ModelFile | None, timeout_s: float
-) -> Recording | ModelFile:
-    """The simulated side. DataError where none is given, or two are."""
+) -> Recording | ModelFile | None:
+    """The simulated side of samples; None where none is given. DataError where two are."""
     if recording is not None and program is not None:
         raise DataError("give the simulation either as a recording or as --simulator, not both")
     if recording is not None:
         return read(recording)
     if program is not None:
         return simulated_by(Simulator(program, timeout_s), measured)
-    if structure is None:
-        raise DataError("no simulation: give a recording of it, --simulator COMMAND or --simulated-model MODEL")
     return structure

@@ -7,8 +7,10 @@ parent, then its joints in order, each about `axis` through `pos`, with angle ze
 import importlib
 import math
 import re
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
 import numpy as np
@@ -18,7 +20,7 @@ from scipy.spatial.transform import Rotation
 from acquisition.recording.files import shown
 from acquisition.recording.files.bounds import ANGLE_RAD, LENGTH_M
 from calibeam.new_rig.drawn import ANY_TURN_RAD, DrawnArm, DrawnJoint, onto_axis
-from calibeam.new_rig.from_urdf import xml_root
+from calibeam.new_rig.from_urdf import urdf_root, xml_root
 from calibrate.errors import DataError
 from calibrate.model.rigid import inverse, transform
 
@@ -40,16 +42,7 @@ _SIZE = re.compile(r"\+?([0-9]{1,18})\.?0*([KMGTPEkmgtpe]?)|-1", re.ASCII)
 
 def mjcf_arm(path: Path, base_body: str | None = None, tip: str | None = None) -> DrawnArm:
     """The arm of an MJCF file. DataError naming file and remedy."""
-    mujoco: Any = importlib.import_module("mujoco")  # its stubs lack most names
-
-    if not path.is_file():
-        raise DataError(f"{path}: no such file; give an MJCF file")
-    _check_sizes(path)
-    try:
-        model = mujoco.MjModel.from_xml_path(str(path))
-    except (ValueError, mujoco.FatalError) as error:
-        raise DataError(f"{path}: MuJoCo cannot load it: {' '.join(str(error).split())}; correct the file") from error
-    _check_bounds(path, model)
+    mujoco, model = mjcf_model(path)
     base = WORLD if base_body is None else _body(mujoco, model, path, base_body)
     end, T_end = _end(mujoco, model, path, tip)
     bodies = _way(model, path, base, end)
@@ -85,6 +78,35 @@ def mjcf_arm(path: Path, base_body: str | None = None, tip: str | None = None) -
     if free:
         notes.append(f"Joints without limits there, taken as one turn either way: {', '.join(free)}.")
     return DrawnArm(path.stem, tuple(drawn), behind @ T_end, tuple(notes))
+
+
+def mjcf_model(path: Path) -> tuple[Any, Any]:
+    """MuJoCo, and the model that it makes of an MJCF file. DataError naming file and remedy."""
+    if not path.is_file():
+        raise DataError(f"{path}: no such file; give an MJCF file")
+    _check_sizes(path)
+    return _loaded(path, lambda mujoco: mujoco.MjModel.from_xml_path(str(path)))
+
+
+def urdf_model(path: Path) -> tuple[Any, Any]:
+    """The same of a URDF file, without its shapes: its masses are stated, and its meshes are seldom beside it."""
+    root = urdf_root(path)
+    _check_element(path, root, 1, [MOST_PARTS])
+    for link in root.findall("link"):
+        for shape in (*link.findall("visual"), *link.findall("collision")):
+            link.remove(shape)
+    text = ElementTree.tostring(root, encoding="unicode")
+    return _loaded(path, lambda mujoco: mujoco.MjModel.from_xml_string(text))
+
+
+def _loaded(path: Path, load: Callable[[Any], Any]) -> tuple[Any, Any]:
+    mujoco: Any = importlib.import_module("mujoco")  # its stubs lack most names
+    try:
+        model = load(mujoco)
+    except (ValueError, mujoco.FatalError) as error:
+        raise DataError(f"{path}: MuJoCo cannot load it: {' '.join(str(error).split())}; correct the file") from error
+    _check_bounds(path, model)
+    return mujoco, model
 
 
 def _check_sizes(path: Path, depth: int = 0) -> None:

@@ -54,7 +54,7 @@ class _Link:
 
 def urdf_arm(path: Path, base_link: str | None = None, tip_link: str | None = None) -> DrawnArm:
     """The arm of a URDF file. DataError naming file, element and remedy."""
-    root = _root(path)
+    root = urdf_root(path)
     links = {_name(path, link): _link(path, link) for link in root.findall("link")}
     if (count := len(root.findall("joint"))) > FEW:
         raise DataError(f"{path}: {count} joints; at most {FEW} are read, give the part of the robot with the arm")
@@ -116,7 +116,8 @@ def xml_root(path: Path, what: str) -> ElementTree.Element:
         raise DataError(f"{path}: no XML: {error}; give a whole {what}") from error
 
 
-def _root(path: Path) -> ElementTree.Element:
+def urdf_root(path: Path) -> ElementTree.Element:
+    """The outer element. DataError for another file, and for xacro."""
     root = xml_root(path, "URDF file")
     if root.tag != "robot":
         raise DataError(f"{path}: the outer element is <{shown(root.tag)}>, not <robot>; give a URDF file")

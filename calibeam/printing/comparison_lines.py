@@ -10,6 +10,7 @@ from calibeam.console import Console
 from calibeam.printing.results import print_diagnosis
 from calibrate.compare import comparison_file
 from calibrate.compare.comparison_file import (
+    ComparedTorques,
     ComparisonFile,
     DifferenceRecord,
     DroppedRecord,
@@ -34,13 +35,27 @@ def print_comparison(console: Console, file: ComparisonFile, *, verbose: bool = 
     links of the chain, the streams and the diagnosis of what differs.
     """
     console.print(Text.assemble((file.verdict, "bold"), f": {file.says}"), highlight=False)
-    console.print(_rows(file), highlight=False)
+    if file.torques is None or file.matched:
+        console.print(_rows(file), highlight=False)
     for line in (*_causes(file), *_constants(file), *_dropped(file.dropped)):
         console.print(line, highlight=False, markup=False)
     for note in file.notes:
         console.print(note, highlight=False, markup=False)
+    if file.torques is not None:
+        console.print(_torques(file.torques))
+        console.print(file.torques.made, highlight=False, markup=False)
     if verbose:
         _print_details(console, file)
+
+
+def _torques(found: ComparedTorques) -> Table:
+    table = Table(title="torque over the moments at which a joint turns (Nm rms)", title_justify="left")
+    for heading in ("joint", "moments", "measured", "simulated", "difference", "with what was found", "noise"):
+        table.add_column(heading, justify="right")
+    for one in found.joints:
+        sizes = (one.measured_nm, one.simulated_nm, one.difference_nm, one.left_nm, one.noise_nm)
+        table.add_row(str(one.joint), str(one.moments), *(f"{size:.3g}" for size in sizes))
+    return table
 
 
 def _print_details(console: Console, file: ComparisonFile) -> None:

@@ -1,11 +1,20 @@
 """A recording compared with a simulation: its recording of the same plan, or a model that predicts the readings."""
 
+from pathlib import Path
+
+import numpy as np
+
 from acquisition.recording import Recording
+from calibeam.results.diagnosis import SEED
 from calibeam.results.simulator import simulated_by_model
+from calibeam.simulation.described_torques import described_torques
 from calibeam.software import SOFTWARE
 from calibrate.compare import compare_recordings
+from calibrate.compare.compared_torques import torques_compared
 from calibrate.compare.comparison_file import ComparisonFile
 from calibrate.compare.rig_and_streams import compare_logs
+from calibrate.diagnose.motion import diagnose_torques
+from calibrate.errors import DataError
 from calibrate.model.model_file import ModelFile
 
 
@@ -29,3 +38,18 @@ def compare(
     return compare_recordings.compare(
         measured, simulated, SOFTWARE, diagnosed=diagnosed, made_of=made_of, structure=structure or made_of
     )
+
+
+def compare_torques(measured: Recording, simulation: Path, samples: ComparisonFile | None) -> ComparisonFile:
+    """The torques of a motion beside those of a URDF or MJCF file; `samples`: their comparison, where one was made.
+
+    DataError where the file is not of this arm, or where the recording holds no torques in motion.
+    """
+    known = described_torques(simulation, measured.rig)
+    found = diagnose_torques(measured, np.random.default_rng(SEED), known)
+    if found is None:
+        raise DataError(
+            "no torques beside joint angles in motion, or too few: record the arm in motion "
+            "(docs/motion-recordings.md), or compare without --simulation"
+        )
+    return torques_compared(measured, known, found, SOFTWARE, samples)

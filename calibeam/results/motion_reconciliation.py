@@ -12,6 +12,7 @@ from acquisition.recording import Recording
 from acquisition.recording.rig import Rig, load_rig
 from calibeam.results.diagnosis import SEED, without_samples
 from calibeam.simulation.closed_loop import tracked
+from calibeam.simulation.described_torques import described_torques
 from calibeam.software import SOFTWARE
 from calibrate.compare.reconciled_rows import LackingRecord, ReconcileFile
 from calibrate.diagnose.motion import (
@@ -26,6 +27,7 @@ from calibrate.diagnose.record.schema import DiagnosisFile
 from calibrate.model.torque_records import TorquesOfModel
 from calibrate.quantities import counted, significant
 
+DESCRIPTIONS = (".xml", ".mjcf", ".urdf")
 NO_TORQUES = "no torques beside joint angles in motion; record both, in one stream or two, for 20 s and more"
 NOT_BETTER = "no model: on the unseen part of the motion it is no better than the simulation, or than its links alone"
 
@@ -88,7 +90,7 @@ def torques_stated(simulation: Path, rig: Rig) -> TorquesOfModel | None:
     """What a simulation states of the torques; None where it states no masses, or is a recording."""
     if simulation.suffix == ".toml":
         return torques_of_rig(load_rig(simulation), simulation.name)
-    return None
+    return described_torques(simulation, rig) if simulation.suffix in DESCRIPTIONS else None
 
 
 def _replayed(measured: Recording, found: MotionReconciled) -> tuple[tuple[JointTorquesRecord, ...], str]:

@@ -18,11 +18,11 @@ from calibrate.compare.chain import (
 )
 from calibrate.compare.comparison_file import (
     ComparisonFile,
-    DifferenceRecord,
     DroppedRecord,
     Level,
     Mismatch,
-    NameOfCause,
+    difference_record,
+    size_records,
 )
 from calibrate.compare.difference_explained import Explanation, explain, notes_of
 from calibrate.compare.fit_to_simulation import Constant
@@ -48,12 +48,10 @@ from calibrate.compare.rig_and_streams import (
 )
 from calibrate.compare.rig_keys import rig_differences
 from calibrate.compare.streams import stream_pairs
-from calibrate.diagnose.assess import Named, Verdict
-from calibrate.diagnose.record.schema import SizeRecord
+from calibrate.diagnose.assess import Verdict
 from calibrate.diagnose.streams import devices_of
 from calibrate.errors import DataError
 from calibrate.fit.identify.wrong_file import wrong_file
-from calibrate.model.effects.term import Size
 from calibrate.model.model_file import ModelFile
 
 Floats = NDArray[np.float64]
@@ -108,7 +106,7 @@ def compare(
         verdict.value,
         _says(verdict, found, asked),
         rig,
-        tuple(_record(one, structure) for one in found),
+        tuple(difference_record(one, structure) for one in found),
         () if asked.found is None else tuple(_dropped(one) for one in asked.found.dropped),
         asked.readings,
         next((one.link for one in judged_links if one.parts), None),
@@ -206,34 +204,4 @@ def _unmatched(measured: Samples, simulated: Samples, rows: Matched) -> tuple[tu
 
 
 def _dropped(one: Constant) -> DroppedRecord:
-    return DroppedRecord(one.where, one.physics, _sizes(dict(zip(one.names, one.sizes, strict=True))))
-
-
-def _sizes(sizes: Mapping[str, Size]) -> dict[str, SizeRecord]:
-    return {name: SizeRecord(_number(size.value), _number(size.sigma)) for name, size in sizes.items()}
-
-
-def _record(one: Mismatch, structure: ModelFile | None) -> DifferenceRecord:
-    others = tuple(_cause(name) for name in one.alternatives)
-    own = {} if structure is None else _own(one, structure)
-    sizes, side = _sizes(one.sizes), one.side.value
-    return DifferenceRecord(
-        one.level.value, one.where, one.physics, sizes, side, one.decides, one.p, one.says, others, own
-    )
-
-
-def _own(one: Mismatch, structure: ModelFile) -> dict[str, float]:
-    """The simulation's own values, by the model that it is made of."""
-    known = {name: structure.chain[name] for name in one.names if name in structure.chain}
-    for effect in structure.effects:
-        if (effect.where, effect.physics) == (one.where, one.physics):
-            known |= {name: p.value for name, p in effect.parameters.items() if p.value is not None}
-    return known
-
-
-def _cause(name: Named) -> NameOfCause:
-    return NameOfCause(name.where, name.physics)
-
-
-def _number(value: float) -> float | None:
-    return value if np.isfinite(value) else None
+    return DroppedRecord(one.where, one.physics, size_records(dict(zip(one.names, one.sizes, strict=True))))

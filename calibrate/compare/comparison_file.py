@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from enum import Enum
 
 import msgspec
+import numpy as np
 
 from calibrate.compare.link_differs import (
     JudgedLink,
@@ -13,6 +14,7 @@ from calibrate.compare.rig_keys import RigKey
 from calibrate.diagnose.assess import Named
 from calibrate.diagnose.record.schema import DiagnosisFile, SizeRecord
 from calibrate.model.effects.term import Size, with_sigma
+from calibrate.model.model_file import ModelFile
 
 
 class Level(Enum):
@@ -134,6 +136,26 @@ class StreamRecord(msgspec.Struct, frozen=True):
     later_than_joints_sigma_s: float | None
 
 
+class ComparedJoint(msgspec.Struct, frozen=True):
+    """Torque of one joint (Nm rms) over the moments at which it turns."""
+
+    joint: int
+    moments: int
+    measured_nm: float
+    simulated_nm: float
+    difference_nm: float
+    left_nm: float  # with all that was found, and masses fitted within their tolerance
+    noise_nm: float
+
+
+class ComparedTorques(msgspec.Struct, frozen=True):
+    """A motion beside a description of its torques."""
+
+    source: str
+    made: str  # how speeds and accelerations were made
+    joints: tuple[ComparedJoint, ...]
+
+
 class ComparisonFile(msgspec.Struct, frozen=True):
     """Everything; `first_link` is None where nothing parts."""
 
@@ -156,3 +178,36 @@ class ComparisonFile(msgspec.Struct, frozen=True):
     streams: tuple[StreamRecord, ...]
     notes: tuple[str, ...]
     diagnosis: DiagnosisFile | None
+    torques: ComparedTorques | None = None
+
+
+def size_records(sizes: Mapping[str, Size]) -> dict[str, SizeRecord]:
+    """As they are written; null for what is no number."""
+    return {name: SizeRecord(_number(size.value), _number(size.sigma)) for name, size in sizes.items()}
+
+
+def difference_record(one: Mismatch, structure: ModelFile | None) -> DifferenceRecord:
+    """As it is written; with the values of a simulation whose structure is known."""
+    others = tuple(_cause(name) for name in one.alternatives)
+    own = {} if structure is None else _own(one, structure)
+    sizes, side = size_records(one.sizes), one.side.value
+    return DifferenceRecord(
+        one.level.value, one.where, one.physics, sizes, side, one.decides, one.p, one.says, others, own
+    )
+
+
+def _own(one: Mismatch, structure: ModelFile) -> dict[str, float]:
+    """The simulation's own values, by the model that it is made of."""
+    known = {name: structure.chain[name] for name in one.names if name in structure.chain}
+    for effect in structure.effects:
+        if (effect.where, effect.physics) == (one.where, one.physics):
+            known |= {name: p.value for name, p in effect.parameters.items() if p.value is not None}
+    return known
+
+
+def _cause(name: Named) -> NameOfCause:
+    return NameOfCause(name.where, name.physics)
+
+
+def _number(value: float) -> float | None:
+    return value if np.isfinite(value) else None

@@ -10,11 +10,11 @@ from acquisition.recording import Recording
 from calibrate.compare.chain import Difference
 from calibrate.compare.comparison_file import (
     ComparisonFile,
-    DifferenceRecord,
     Level,
     Mismatch,
     Side,
     StreamRecord,
+    difference_record,
 )
 from calibrate.compare.fit_to_simulation import SimulationFit
 from calibrate.compare.link_differs import JudgedLink
@@ -30,7 +30,6 @@ from calibrate.compare.streams import (
     stream_pair,
 )
 from calibrate.diagnose.assess import Verdict
-from calibrate.diagnose.record.schema import SizeRecord
 from calibrate.diagnose.state import Fitted
 from calibrate.diagnose.streams import devices_of, streams_of
 from calibrate.errors import DataError
@@ -197,21 +196,7 @@ def compare_logs(measured: Recording, simulated: Recording, software: str) -> Co
         )
     pair = stream_pair(ZEROLESS, one, two)
     found = stream_mismatches(measured, simulated, None, (pair,))
-    records = tuple(
-        DifferenceRecord(
-            m.level.value,
-            m.where,
-            m.physics,
-            {name: SizeRecord(size.value, size.sigma) for name, size in m.sizes.items()},
-            m.side.value,
-            m.decides,
-            m.p,
-            m.says,
-            (),
-            {},
-        )
-        for m in found
-    )
+    records = tuple(difference_record(one, None) for one in found)
     verdict, says = _verdict_of_logs(found, pair)
     return ComparisonFile(
         1,

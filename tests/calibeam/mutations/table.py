@@ -190,6 +190,8 @@ RIGS = (
     Pair("rig.toml", "centre rig.toml --out made.mcap --yes"),
     Pair("arm.urdf", "rig new --from-urdf arm.urdf --out made.toml"),
     Pair("arm.xml", "rig new --from-mjcf arm.xml --tip-link tip --out made.toml"),
+    Pair("arm.urdf", "compare tracker --simulation arm.urdf"),
+    Pair("arm.xml", "compare tracker --simulation arm.xml"),
     Pair("dh.csv", "rig new --from-dh dh.csv --out made.toml"),
     Pair("tracked.toml", "session tracked.toml --out made --yes"),
     Pair("tracked.toml", "check tracked.toml"),
