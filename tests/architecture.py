@@ -202,7 +202,7 @@ def figures() -> tuple[Figure, ...]:
 
 
 TODAY = {
-    "files": 805,
+    "files": 818,
     "code": 88_600,
     "longest_function": 53,
     "one_importer": 2,

@@ -28,6 +28,7 @@ from calibrate.diagnose.record.file import write_diagnosis
 from calibrate.errors import DataError
 from calibrate.model.model_file import write_model
 
+
 def reconcile_command(
     measured: Path, *, simulation: Path, out: Path = Path("reconcile"), seed: int = 0, json: bool = False
 ) -> None:
@@ -48,8 +49,8 @@ def reconcile_command(
         A recording, or a session folder with rig.toml and samples.csv.
     simulation
         The simulation: a recording of the same plan, a session folder, or a rig file (.toml), whose arm as stated is
-        moved through the recorded poses. Of a recording in motion: a rig file that states masses, an MJCF or a URDF file
-        (.xml, .urdf), for its torques.
+        moved through the recorded poses. Of a recording in motion: a rig file that states masses, an MJCF or a URDF
+        file (.xml, .urdf), for its torques.
     out
         Folder for page.html, reconcile.json, before.json, diagnosis.json, model.json, simulated.mcap and after.json
         (of too few rows the first three; of a motion without samples page, reconciliation, diagnosis and, where it

@@ -124,7 +124,7 @@ def _side(finding: Finding, known: TorquesOfModel) -> Side:
 def _of_links(found: TorqueDiagnosis, source: str) -> list[Mismatch]:
     """One line where fitted numbers of links and rotors change the torque of a joint by more than its noise."""
     model = found.model
-    change = model.problem.columns @ (model.links - start_values(model.problem.links))
+    change = model.problem.columns @ (model.links - model.problem.links.stated)
     sizes = [_rms(change[model.problem.joint == j]) for j in range(len(model.problem.sigma_nm))]
     j = int(np.argmax(sizes / model.problem.sigma_nm))
     if sizes[j] <= model.problem.sigma_nm[j]:
