@@ -202,8 +202,8 @@ def figures() -> tuple[Figure, ...]:
 
 
 TODAY = {
-    "files": 789,
-    "code": 85_000,
+    "files": 796,
+    "code": 85_540,
     "longest_function": 53,
     "one_importer": 2,
     "classes": 0,

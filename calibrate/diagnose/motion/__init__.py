@@ -1,5 +1,18 @@
 """A recording in motion: what its joints' torques hold beside rigid links."""
 
-from calibrate.diagnose.motion.torques import TorqueDiagnosis, diagnose_torques, with_torques
+from calibrate.diagnose.motion.motion_table import BAND_HZ, MOST_ROWS, STILL_SHARE, Motion
+from calibrate.diagnose.motion.torque_problem import LOOSE, link_parameters
+from calibrate.diagnose.motion.torques import TorqueDiagnosis, diagnose_torques, motion_drivers, with_torques
 
-__all__ = ["TorqueDiagnosis", "diagnose_torques", "with_torques"]
+__all__ = [
+    "BAND_HZ",
+    "LOOSE",
+    "MOST_ROWS",
+    "STILL_SHARE",
+    "Motion",
+    "TorqueDiagnosis",
+    "diagnose_torques",
+    "link_parameters",
+    "motion_drivers",
+    "with_torques",
+]

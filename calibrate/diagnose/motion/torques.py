@@ -73,7 +73,7 @@ def usual_friction(bare: TorqueState) -> tuple[Accepted, ...]:
 
 def torque_state(rig: Rig, motion: Motion) -> TorqueState:
     """The links alone, fitted."""
-    drivers = _drivers(rig, motion)
+    drivers = motion_drivers(rig, motion)
     links = link_parameters(rig)
     moment, joint = (part.astype(np.intp) for part in np.nonzero(np.isfinite(motion.torque_nm)))
     order = np.lexsort((moment, joint))
@@ -101,7 +101,8 @@ def torque_state(rig: Rig, motion: Motion) -> TorqueState:
     return first.refitted(()).renewed()
 
 
-def _drivers(rig: Rig, motion: Motion) -> MotionDrivers:
+def motion_drivers(rig: Rig, motion: Motion) -> MotionDrivers:
+    """What the terms of the catalogue depend on, and the columns of the links; its torque that of the stated links."""
     arm = arm_of(rig)
     frames = arm.frames(start_values(arm.parameters), motion.q_rad)
     qd, qdd, none = motion.qd_rad_s, motion.qdd_rad_s2, np.zeros_like(motion.qd_rad_s)
