@@ -41,6 +41,7 @@ GROUPS: dict[str, tuple[ListedCommand, ...]] = {
             "Calibrate the arm from a recording: identify, diagnose, prove, report.",
         ),
         ListedCommand("design", "design:design_command", "Choose the poses of a session before it is run."),
+        ListedCommand("excite", "excite:excite_command", "Design a motion that shows the torques of all joints."),
         ListedCommand("identify", "identify:identify_command", "Identify the arm's geometry from a recording."),
         ListedCommand("diagnose", "diagnose:diagnose_command", "Find the physics that the geometric model leaves out."),
         ListedCommand(

@@ -12,6 +12,7 @@ from msgspec.structs import fields
 from acquisition.centring.camera import model as camera
 from acquisition.motion.task.task_file import TaskEntries
 from acquisition.recording.mcap import read
+from acquisition.recording.motion_plan import MotionPlan
 from acquisition.recording.pose_plan import PosePlan
 from acquisition.recording.rig import Rig
 from acquisition.recording.session_folder.stream_tables import StreamsAbout
@@ -23,7 +24,19 @@ from calibrate.fit.fit_plan import FitPlan
 from calibrate.model.model_file import ModelFile
 
 ROOT = Path(__file__).parents[1]
-RECORDS = (Rig, PosePlan, FitPlan, ErrorPlan, TaskEntries, ModelFile, DiagnosisFile, Row, StreamsAbout, PartFile)
+RECORDS = (
+    Rig,
+    PosePlan,
+    MotionPlan,
+    FitPlan,
+    ErrorPlan,
+    TaskEntries,
+    ModelFile,
+    DiagnosisFile,
+    Row,
+    StreamsAbout,
+    PartFile,
+)
 PRIVATE = (camera._File, read._ChannelRow)  # pyright: ignore[reportPrivateUsage] - records of one reader
 # Read by the program that wrote them, in one run or in a sealed folder; nobody edits them.
 OWN = {"Truth": "prove", "Begun": "prove", "ProofFile": "prove", "Task": "fleet", "ReconcileFile": "prove"}

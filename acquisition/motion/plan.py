@@ -154,7 +154,7 @@ def _too_fast(made: Plan, cell: Cell) -> Floats:
 
 def _check_grip(made: Plan) -> None:
     """Of segments by joints none is needed; the joint that has lost it is the one named."""
-    joint_wise = np.array([segment.by is By.JOINTS for segment in made.segments])
+    joint_wise = np.array([segment.by in (By.JOINTS, By.CURVE) for segment in made.segments])
     index = np.minimum(made.segment, len(made.segments) - 1)
     moves = np.any(made.q_rad != made.start_rad, axis=1)
     for k in np.flatnonzero(moves & ~joint_wise[index])[::GRIP_EVERY]:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from acquisition.motion.inverse.solve import Solver
 from acquisition.motion.kinematics import inverse, rotation_vector, transform
-from acquisition.motion.paths.segments import Place
+from acquisition.motion.paths.segments import Curve, Place
 
 Floats = NDArray[np.float64]
 
@@ -122,6 +122,34 @@ class JointLeg:
 
     def joints(self, point: Floats, s_m: float, near_rad: Floats) -> Floats:
         return point + self.per_m * (s_m - self.s1_m)
+
+
+@dataclass(frozen=True, eq=False)
+class CurveLeg:
+    """Readings over time. The arm stands for `stand_s` before and after, in which the transitions have their place."""
+
+    curve: Curve
+    stand_s: float
+    slower: float = 1.0
+
+    @property
+    def duration_s(self) -> float:
+        return 2.0 * self.stand_s + self.slower * self.curve.length_s
+
+    def point(self, t_s: float) -> Floats:
+        return self.curve.at(min(max((t_s - self.stand_s) / self.slower, 0.0), self.curve.length_s))
+
+    def flat(self, point: Floats) -> Floats:
+        return point
+
+    def unflat(self, vector: Floats) -> Floats:
+        return vector
+
+    def from_joints(self, q_rad: Floats, s_m: float) -> Floats:
+        return q_rad
+
+    def joints(self, point: Floats, s_m: float, near_rad: Floats) -> Floats:
+        return point
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from acquisition.errors import RefusedMotionError, UnreachableError
 from acquisition.motion.inverse.solve import Solver
 from acquisition.motion.kinematics import apart
-from acquisition.motion.paths.legs import JointLeg, Leg, LineLeg, drive_between
+from acquisition.motion.paths.legs import CurveLeg, JointLeg, Leg, LineLeg, drive_between
 from acquisition.motion.paths.segments import Blend, By, Pace, Place, Segment, blend, state_of
 
 Floats = NDArray[np.float64]
@@ -133,6 +133,8 @@ class Path:
     def _leg_to(self, segment: Segment, from_rad: Floats, belt: BeltState) -> Leg:
         """From the corner, where the arm would stand at `from_rad`, with the belt as it is there."""
         place = segment.place
+        if segment.curve is not None:
+            return CurveLeg(segment.curve, self._tacc_s, segment.slower)
         if segment.by is By.LINE or (segment.by is By.STAND and (place.coord is not None or self._on_line)):
             return self._line(segment, from_rad, belt)
         if segment.by is By.STAND:

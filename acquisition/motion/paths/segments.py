@@ -46,7 +46,16 @@ class By(enum.Enum):
 
     JOINTS = "joint"
     LINE = "line"
+    CURVE = "curve"  # readings over time, as given
     STAND = "stand"  # at the end of the segment before, in its coordinates
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """Readings over time, at rest at both ends and without acceleration there."""
+
+    at: Callable[[float], Floats]  # (joint,) from 0 to length_s
+    length_s: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,6 +69,7 @@ class Segment:
     slower: float = 1.0
     action: str = ""  # done when the arm has come to rest in a stand
     posture_rad: Floats | None = None  # of a segment by joints: the very posture, where the place leaves a choice
+    curve: Curve | None = None  # of By.CURVE; the segment before ends where it begins
 
 
 @dataclass(frozen=True, eq=False)

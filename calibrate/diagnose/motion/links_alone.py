@@ -60,6 +60,11 @@ def torque_state(rig: Rig, motion: Motion, known: TorquesOfModel | None = None) 
     return first.refitted(()).renewed()
 
 
+def stated_drivers(rig: Rig, motion: Motion) -> MotionDrivers:
+    """Under the load of the links that the rig file states."""
+    return with_torque(motion_drivers(rig, motion), link_prior(rig).stated)
+
+
 def expected_nm(rig: Rig, motion: Motion, known: TorquesOfModel) -> Floats:
     """(moment, joint) torques that a model or simulation expects, also of joints that stand."""
     drivers, links = motion_drivers(rig, motion, known), link_prior(rig, known).stated

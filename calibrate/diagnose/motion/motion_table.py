@@ -86,6 +86,17 @@ def motion_of(recording: Recording) -> Motion | None:
     return _thinned(runs, recording, band_hz, period_s) if runs else None
 
 
+def planned_motion(time_s: Floats, q: Floats, qd: Floats, qdd: Floats, jerk: Floats) -> Motion:
+    """Of a plan, (moment, joint) each; torques are not known, and take no part."""
+    still, none = STILL_SHARE * np.abs(qd).max(axis=0) + 1e-9, np.zeros(q.shape[1])
+    return Motion(time_s, q, qd, qdd, jerk, np.full_like(q, np.nan), still, None, BAND_HZ, none, none)
+
+
+def moments_in(length_s: float) -> float:
+    """How many moments a motion of this length has for a diagnosis."""
+    return min(MOST_ROWS, 2.0 * BAND_HZ * length_s)
+
+
 def _on_clock_of(joints: StreamDevice, torque: StreamDevice) -> Track | None:
     """The torques; of another stream by the promptest arrivals. None where nothing shows how the clocks differ."""
     if torque.sequence is joints.sequence:

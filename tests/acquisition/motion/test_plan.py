@@ -8,7 +8,7 @@ from acquisition.motion.cell import Box, Cell, SlowArea, body_points
 from acquisition.motion.inverse.closed_form import closed_form
 from acquisition.motion.inverse.solve import Solver
 from acquisition.motion.kinematics import transform
-from acquisition.motion.paths.segments import By, Pace, Place, Segment
+from acquisition.motion.paths.segments import By, Curve, Pace, Place, Segment
 from acquisition.motion.plan import OVER, plan
 from acquisition.recording.rig import load_rig
 from calibeam.motion.gate_of_rig import cell_of, pace_of
@@ -107,3 +107,21 @@ def test_a_joint_that_would_leave_its_range_is_named() -> None:
     )
     with pytest.raises(RefusedMotionError, match=r"segment 1 'over' \(line\).*joint 6 at .* leaves its range"):
         plan(SOLVER, edge_rad, [segment], PACE, OPEN)
+
+
+def test_a_curve_is_driven_as_it_is_and_stretched_where_it_is_too_fast() -> None:
+    def curve(t_s: float) -> np.ndarray:  # 1 - cos: at rest at both ends; its acceleration there is blended
+        return HOME_RAD + 0.1 * (1.0 - np.cos(2.0 * np.pi * t_s / 4.0)) ** 2 * np.array([1.0, 0, 0, 0, 0, 0])
+
+    place = Place("there", HOME, np.eye(4))
+    slow = plan(SOLVER, HOME_RAD, [Segment("curve", By.CURVE, place, curve=Curve(curve, 4.0))], PACE, OPEN)
+    assert slow.segments[0].slower == 1.0
+    begin_s = slow.corners_s[0] + PACE.tacc_s
+    inside = (slow.t_s > begin_s) & (slow.t_s < begin_s + 4.0)
+    there = np.array([curve(t_s - begin_s) for t_s in slow.t_s[inside]])
+    assert slow.q_rad[inside] == pytest.approx(there, abs=1e-9)
+    assert slow.q_rad[-1] == pytest.approx(HOME_RAD, abs=1e-9)
+    quick = Pace(np.full(6, 0.1), np.full(6, 4.0))
+    made = plan(SOLVER, HOME_RAD, [Segment("curve", By.CURVE, place, curve=Curve(curve, 4.0))], quick, OPEN)
+    assert made.segments[0].slower > 1.5
+    assert np.abs(made.rates()[0]).max() <= OVER * 0.1

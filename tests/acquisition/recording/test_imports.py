@@ -36,6 +36,7 @@ DOORS = {  # single modules that are open beside the faces: vocabularies, and wh
             "device_clock",
             "files.bounds",
             "mcap.layout",
+            "motion_plan",
             "pose_plan",
             "restored_stamps",
             "rig.devices",
