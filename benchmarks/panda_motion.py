@@ -17,8 +17,9 @@ import numpy as np
 from acquisition.recording import Recording, read
 from benchmarks.motion import SEED, friction_of, left_by_least_squares_nm
 from calibeam.cli import run
-from calibrate.diagnose.motion import motion_in_two, reconcile_motion
+from calibrate.diagnose.motion import reconcile_motion
 from calibrate.diagnose.motion.motion_table import motion_of
+from calibrate.diagnose.motion.unseen_motion import motion_in_two
 
 # a_m, alpha in right angles, d_m: Franka Emika, Franka Control Interface documentation, in Craig's notation
 TABLE = ((0, 0, 0.333), (0, -1, 0), (0, 1, 0.316), (0.0825, 1, 0), (-0.0825, -1, 0.384), (0, 1, 0), (0.088, 1, 0))

@@ -1,26 +1,26 @@
 """An exciting motion before it is run: what it would show, joint by joint, and how near it comes to limits."""
 
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from calibeam.console import Console
 from calibeam.printing.tables import plain_table
-from calibrate.excitation import LEAST_SHARE, NOISE_SHARE, ROTOR, Excitation
 from calibrate.quantities import DASH, counted, significant
 
-ASSUMED = (
-    f"{100.0 * NOISE_SHARE:g} % of a joint's expected torque, at least {100.0 * LEAST_SHARE:g} % of the largest joint's"
-)
+if TYPE_CHECKING:
+    from calibrate.excitation import Excitation
+
 COLUMNS = (
     ("dry friction, Nm", "friction_nm"),
     ("viscous, Nm s/rad", "friction_nms_per_rad"),
-    ("rotor, kg m²", ROTOR),
+    ("rotor, kg m²", "rotor_kg_m2"),
     ("spring, Nm/rad", "stiffness_nm_per_rad"),
 )
 
 
-def print_excitation(console: Console, made: Excitation, *, noise_given: bool) -> None:
+def print_excitation(console: Console, made: "Excitation", *, noise_given: bool) -> None:
     """Sigmas, then limits."""
     plan, found = made.plan, made.information
     console.print(
@@ -36,7 +36,7 @@ def print_excitation(console: Console, made: Excitation, *, noise_given: bool) -
         table.add_row(str(joint), *row)
     console.print(table)
     lean = " and ".join(_shown(found.sigma.get(("base.lean", f"lean_{axis}_rad")), 1e3) for axis in "xy")
-    noise = "as given" if noise_given else f"assumed: {ASSUMED}"
+    noise = "as given" if noise_given else f"assumed: {made.assumed_noise}"
     lines = [
         f"payload: {_shown(found.sigma.get(('tool.load', 'mass_kg')))} kg; lean of gravity about x and y: {lean} mrad",
         f"{DASH}: not determined by this motion with the masses that the rig file states",

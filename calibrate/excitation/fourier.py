@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from acquisition.recording.motion_plan import JointSeries, MotionPlan
 from acquisition.recording.rig import Rig
 from calibrate.errors import DataError
-from calibrate.excitation.catalogue_sigmas import TorqueInformation, torque_information
+from calibrate.excitation.catalogue_sigmas import LEAST_SHARE, NOISE_SHARE, TorqueInformation, torque_information
 
 Floats = NDArray[np.float64]
 Clear = Callable[[Floats, float], bool]  # readings (moment, joint) and the time between them (s): all of it allowed
@@ -56,6 +56,12 @@ class Excitation:
     room_rad: Floats  # (joint,) to the nearer end of its range
     speed_share: Floats  # (joint,)
     acceleration_share: Floats  # (joint,)
+
+    @property
+    def assumed_noise(self) -> str:
+        """What is assumed of a torque's noise where none is given."""
+        share, least = 100.0 * NOISE_SHARE, 100.0 * LEAST_SHARE
+        return f"{share:g} % of a joint's expected torque, at least {least:g} % of the largest joint's"
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,7 +9,6 @@ from calibrate.diagnose.motion.torques import TorqueDiagnosis, diagnose_torques,
 from calibrate.diagnose.motion.unseen_motion import (
     JointTorquesRecord,
     MotionReconciled,
-    motion_in_two,
     reconcile_motion,
 )
 
@@ -23,7 +22,6 @@ __all__ = [
     "link_prior",
     "model_of_motion",
     "moments_in",
-    "motion_in_two",
     "planned_motion",
     "reconcile_motion",
     "stated_drivers",
