@@ -26,7 +26,8 @@ ORDER = 4  # of the low pass, run both ways
 MOST_ROWS = 600  # of six torques: more cost time and show hardly more
 FEWEST_ROWS = 60
 LEAST_RUN_S = 1.0  # without a gap
-EDGE_PERIODS = 2.0  # of the band, that are left out at the ends of a run
+EDGE_PERIODS = 3.0  # of the band, that are left out at the ends of a run
+TURN_PERIODS = 2.0  # and before and after a joint turns back: the low pass rings there
 STILL_SHARE = 0.02  # of a joint's greatest speed; below it is taken to stand
 STILL_SIGMAS = 4.0
 TEMPERATURE = "joint_temperature_degC"
@@ -156,7 +157,7 @@ def _thinned(runs: list[_Run], recording: Recording, band_hz: float, period_s: f
     fastest = np.max([np.abs(run.qd_rad_s).max(axis=0) for run in runs], axis=0)
     still = np.maximum(STILL_SHARE * fastest, STILL_SIGMAS * speed * noise) + 1e-9
     step = max(1, round(0.5 / band_hz / period_s), -(-sum(len(run.time_s) for run in runs) // MOST_ROWS))
-    parts = [_rows(run, still, round(0.5 / band_hz / period_s), step) for run in runs]
+    parts = [_rows(run, still, round(TURN_PERIODS / band_hz / period_s), step) for run in runs]
     time_s, q, qd, qdd, jerk, torque = (np.concatenate(each) for each in zip(*parts, strict=True))
     if len(time_s) < FEWEST_ROWS or not np.isfinite(torque).any():
         return None

@@ -31,6 +31,7 @@ Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 Ints = NDArray[np.intp]
 
+SHARED = (".load", ".lean")  # ports of torque that act at several joints in proportions of their own
 WAVES = {1: 10, 2: 5}  # of each driver, by their number
 SCALES = (0.15, 0.3, 0.6, 1.2)  # length over half the range of a driver
 LOUDNESS = (0.003, 0.03, 0.3, 3.0, 30.0, 300.0)  # variance of the process over that of the noise
@@ -192,14 +193,16 @@ def lever(bench: Bench, port: Port, component: int) -> Floats:
 def places_of(bench: Bench) -> tuple[tuple[Port, int], ...]:
     """Ports of the catalogue and the components where a candidate acts.
 
-    Lengths of links are left to geometry, and what a late clock does at each joint to the joint itself.
+    Lengths of links are left to geometry, what a late clock does at each joint to the joint itself, and what carries or
+    leans to the torques of the joints.
     """
     found: dict[tuple[Port, int], tuple[Port, int]] = {}
     drivers = bench.state.drivers
     for term in {(t.port, t.physics): t for t in bench.candidates}.values():
         inner = np.array([spec.grid[len(spec.grid) // 2] for spec in term.inner])
         where = term.port.where
-        if where == TIME or term.port.past_encoders or (where.startswith("link") and not where.endswith(".tilt")):
+        at_link = where.startswith("link") and not where.endswith(".tilt")
+        if where == TIME or term.port.past_encoders or at_link or where.endswith(SHARED):
             continue
         acts = np.any(term.basis(drivers, inner) != 0.0, axis=(0, 2))
         for component in np.flatnonzero(acts):
