@@ -202,8 +202,8 @@ def figures() -> tuple[Figure, ...]:
 
 
 TODAY = {
-    "files": 796,
-    "code": 85_540,
+    "files": 798,
+    "code": 85_780,
     "longest_function": 53,
     "one_importer": 2,
     "classes": 0,

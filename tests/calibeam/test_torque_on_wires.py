@@ -7,22 +7,15 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
-import numpy as np
 import pytest
 
-from acquisition.recording import RecordingWriter
-from acquisition.wires.streams import Pump
 from calibeam.cli import run
-from drivers.clock import SystemClock
-from drivers.ur.control import UrControl
-from drivers.ur.reader import UrReader
+from calibrate.excitation import fourier
 from simulators.ur.readout import TORQUE_PER_CURRENT_NM_A
 
 RIG = Path(__file__).parents[2] / "rigs" / "ur5e-dual-psd.toml"
 FRICTION_NM = 4.0
-MIDDLE_RAD = np.array([0.3, -1.4, 1.4, -0.8, 0.5, 0.0])
-REACH_RAD = np.array([1.0, 0.5, 0.8, 1.0, 1.0, 1.5])
-MOVES = 16
+TIME_SCALE = 2
 
 
 def rig_text() -> str:
@@ -44,7 +37,7 @@ def emulated(tmp_path: Path) -> Iterator[str]:
     rig = tmp_path / "rig.toml"
     rig.write_text(rig_text(), encoding="utf-8")
     hidden = ["--hide", f"coulomb joint3 {FRICTION_NM}"]
-    served = ["--json", "--end-with-stdin", "--robot-host", "auto", "--time-scale", "4", *hidden]
+    served = ["--json", "--end-with-stdin", "--robot-host", "auto", "--time-scale", str(TIME_SCALE), *hidden]
     command = [sys.executable, "-m", "calibeam", "emulate", str(rig), *served]
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
         assert process.stdin is not None
@@ -54,35 +47,34 @@ def emulated(tmp_path: Path) -> Iterator[str]:
         process.wait(10.0)
 
 
-def record_motion(host: str, path: Path) -> None:
-    """A robot on its ways between drawn poses, at several speeds."""
-    rng, clock, failures = np.random.default_rng(4), SystemClock(), []
-    control, reader = UrControl(host), UrReader(host, clock=clock)
-    control.connect()
-    try:
-        control.move_joints(MIDDLE_RAD, 2.0, 10.0)
-        with RecordingWriter(path, rig_text=rig_text(), software="test", clock=clock) as writer:
-            reader.connect()
-            stream = writer.stream(reader.name, reader.describe(), stamps="sampled")
-            pump = Pump(
-                reader, clock, lambda b: stream.append(b.host_s, b.device_s, b.sequence, b.values), failures.append
-            )
-            pump.start()
-            for _ in range(MOVES):
-                goal_rad = MIDDLE_RAD + REACH_RAD * rng.uniform(-1.0, 1.0, 6)
-                control.move_joints(goal_rad, rng.uniform(0.5, 1.5), rng.uniform(2.0, 5.0))
-            pump.stop()
-    finally:
-        control.close()
-        reader.close()
-    assert not failures
+@pytest.fixture
+def motion(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setattr(fourier, "DRAWN", 6)
+    monkeypatch.setattr(fourier, "STEPS", 6)
+    out = tmp_path / "motion.toml"
+    words = ["excite", str(tmp_path / "rig.toml"), "--out", str(out), "--length-s", "10", "--repeats", "2"]
+    assert run([*words, "--speed-share", "0.8"]) == 0
+    return out
 
 
-def test_dry_friction_is_named_at_its_joint_with_its_size(emulated: str, tmp_path: Path) -> None:
-    path, out = tmp_path / "motion.mcap", tmp_path / "diagnosis.json"
-    record_motion(emulated, path)
-    assert run(["diagnose", str(path), "--out", str(out)]) == 0
+def session(tmp_path: Path, host: str, motion: Path) -> int:
+    reached = tmp_path / "reached.toml"
+    reached.write_text(re.sub(r'host = ".*"', f'host = "{host}"', rig_text()), encoding="utf-8")
+    words = ["session", str(reached), "--motion", str(motion), "--out", str(tmp_path / "moved"), "--yes"]
+    return run([*words, "--time-scale", str(TIME_SCALE)])
+
+
+def test_dry_friction_is_named_at_its_joint_with_its_size(emulated: str, motion: Path, tmp_path: Path, capsys) -> None:
+    out = tmp_path / "diagnosis.json"
+    assert session(tmp_path, emulated, motion) == 0
+    said = " ".join(capsys.readouterr().out.split())
+    assert "scatter of the torque between repeats" in said
+    assert f"next: calibeam diagnose {tmp_path / 'moved'}" in said
+    assert run(["check", str(tmp_path / "moved")]) == 0
+    assert "not one settled sample" not in capsys.readouterr().out
+    assert run(["diagnose", str(tmp_path / "moved"), "--out", str(out)]) == 0
     said = json.loads(out.read_text(encoding="utf-8"))
-    found = [one for one in said["findings"] if one["share"] > 0.01]
-    assert [(one["physics"], one["where"]) for one in found] == [("coulomb-friction", "joint3.torque")]
-    assert found[0]["parameters"]["friction_nm"]["value"] == pytest.approx(FRICTION_NM, rel=0.02)
+    found, *others = said["findings"]  # the largest first; set-points that a busy machine sends late shake the arm
+    assert (found["physics"], found["where"]) == ("coulomb-friction", "joint3.torque")
+    assert found["parameters"]["friction_nm"]["value"] == pytest.approx(FRICTION_NM, rel=0.03)
+    assert "coulomb-friction" not in {one["physics"] for one in others if one["share"] > 0.01}
