@@ -4,7 +4,7 @@ To rest within the acceleration of every joint: along the path where it stands s
 """
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
@@ -20,6 +20,7 @@ from drivers.clock import Clock
 
 Floats = NDArray[np.float64]
 
+PASSED_EVERY = 20  # set-points; in 40 ms no shift that matters goes unseen
 PROBE_S = 1e-3  # of path time, over which the speed of the joints along the path is read off
 
 
@@ -55,6 +56,7 @@ class Followed:
     from_s: float = 0.0  # host time of the first set-point, and of the last
     to_s: float = 0.0
     cut_short: bool = False  # a stop ended it before the end of its path
+    passed: list[tuple[float, float]] = field(default_factory=list[tuple[float, float]])  # clock and path time (s)
 
 
 @dataclass(frozen=True)
@@ -183,6 +185,8 @@ class Following:
     def _send(self, q_rad: Floats) -> None:
         now_s = self._clock.now_s()
         self._checked.check(q_rad, now_s)
+        if self.followed.sent % PASSED_EVERY == 0:
+            self.followed.passed.append((now_s, self._points.on_path(self._cycle * self._period_s).t_s))
         self._arm.servo_joints(q_rad, self._period_s, self._stream.lookahead_s, self._stream.gain)
         self._speed_rad_s, self._q_rad = (q_rad - self._q_rad) / self._period_s, q_rad
         self._cycle += 1

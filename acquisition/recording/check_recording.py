@@ -7,12 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from acquisition.recording.can_frames import CHANNELS_NOTE, FLAGS, FrameFlag, is_frames
-from acquisition.recording.mcap.layout import SEGMENT_NOTE, STREAMS_NOTE
+from acquisition.recording.mcap.layout import MOTION_NOTE, SEGMENT_NOTE, STREAMS_NOTE
 from acquisition.recording.recording import Recording, Stream
 from acquisition.recording.samples import Floats
 from acquisition.recording.stamp_findings import stamp_findings
 
-LOG_NOTES = (SEGMENT_NOTE, CHANNELS_NOTE, STREAMS_NOTE)
+LOG_NOTES = (SEGMENT_NOTE, CHANNELS_NOTE, STREAMS_NOTE, MOTION_NOTE)
 
 
 class Problem(enum.Enum):
@@ -167,7 +167,7 @@ def _samples(recording: Recording) -> Iterator[Finding]:
 
 
 def is_log(recording: Recording) -> bool:
-    """Whether it was recorded, or imported, without a session or an arm: nobody expects settled samples in it."""
+    """Whether it was recorded, or imported, without poses to settle at: nobody expects settled samples in it."""
     return recording.rig.n_joints == 0 or any(note in recording.notes for note in LOG_NOTES)
 
 

@@ -26,6 +26,7 @@ Floats = NDArray[np.float64]
 Length = Annotated[float, Meta(ge=1.0, le=3600.0)]  # s; a motion of an hour is as long as the gate takes
 Repeats = Annotated[int, Meta(ge=1, le=1000)]
 
+MOTION_EVENT = "motion"  # with length_s, repeats, and host_s when the set-points were at motion_s (s, from its begin)
 MOTION_PLAN = toml_output(("schema", "rig", "length_s", "repeats", "joint"), "motion plan")
 REST_RAD_S, REST_RAD_S2 = 1e-4, 1e-3  # speed and acceleration at which a joint is at rest: coefficients have digits
 CHECKED = 4000  # moments of a repeat whose angles are compared with the ranges of the joints

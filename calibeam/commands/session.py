@@ -15,6 +15,7 @@ from acquisition.guided.plan import GuidedOptions, planned_visits
 from acquisition.guided.touch import TouchOptions, TouchPerson
 from acquisition.recording import RecordingError
 from acquisition.recording.mcap import parts
+from acquisition.recording.motion_plan import read_motion_plan
 from acquisition.recording.pose_plan import PosePlan, read_pose_plan
 from acquisition.recording.rig import Rig, load_rig, rig_text
 from acquisition.session.plan import PlanOptions
@@ -26,7 +27,11 @@ from calibeam.emulation import ask_emulators, moves_nothing_real
 from calibeam.guided.recorded import encoder_address, is_guided
 from calibeam.guided.run import plan_of, run_guided
 from calibeam.live.feed import SILENT, Feed
+from calibeam.motion.robot import controller_of
 from calibeam.sessions.job import EarlierParts, Job, new_place, read_earlier_parts, with_place, with_places
+from calibeam.sessions.person import Person
+from calibeam.sessions.reporter import StatusReporter
+from calibeam.sessions.views import PlainView
 from calibeam.sessions.with_detectors import WithDetectors
 from calibeam.site_log import logged
 from drivers.clock import SystemClock
@@ -56,6 +61,9 @@ class RobotOptions:
         four probing moves, or law (8) of the source with the fixture pose as guessed.
     gain
         Of law8: the share of the correction that each step takes, above 0 and up to 1.
+    motion
+        A motion of all joints, as `calibeam excite` writes it: it is run and recorded for `calibeam diagnose`, and
+        nothing is measured on the way.
 
     """
 
@@ -66,6 +74,7 @@ class RobotOptions:
     yes: bool = False
     centring: CentringBy = CentringBy.REGISTERED
     gain: float = CentringChoice.gain
+    motion: Path | None = None
 
     @property
     def given(self) -> dict[str, bool]:
@@ -78,6 +87,7 @@ class RobotOptions:
             "--yes": self.yes,
             "--centring": self.centring is not CentringBy.REGISTERED,
             "--gain": self.gain != CentringChoice.gain,
+            "--motion": self.motion is not None,
         }
 
 
@@ -300,6 +310,11 @@ def session(
         return _session_by_contact(wanted, contact, hand.postures, Console(), go_on=robot.continue_)
     _refuse_ignored(wanted.rig, contact.given, "a session by contact, --touch")
     of_robot = {**robot.given, "--live": page != PageOptions()}
+    if robot.motion is not None:
+        ignored = {name: given for name, given in of_robot.items() if name not in ("--yes", "--motion")}
+        ignored |= {**hand.given, **tracker.given, "--verify": hand.verify, "--plan": plan is not None}
+        _refuse_ignored(wanted.rig, ignored, "a session that measures, and --motion runs a motion")
+        return _session_in_motion(wanted, robot.motion, agrees=robot.yes)
     if not is_tracked(wanted.rig):
         _refuse_ignored(wanted.rig, tracker.given, "a rig with a tracker")
     if is_guided(wanted.rig):
@@ -353,6 +368,21 @@ def _session_with_tracker(wanted: Wanted, tracker: TrackerOptions, page: PageOpt
     )
     with _page(rig, page, console) as feed:
         WithTracker(job, console, feed, asking=asking, agrees=agreed).run()
+
+
+def _session_in_motion(wanted: Wanted, motion: Path, *, agrees: bool) -> None:
+    """The session that runs a motion and records it."""
+    from calibeam.sessions.with_motion import MotionJob, run_motion
+
+    rig, asking, console, clock = wanted.rig, at_terminal(), Console(), SystemClock()
+    plan = read_motion_plan(motion, rig)
+    _refuse_begun(wanted.out)
+    agreed = agrees or (
+        wanted.emulators.control is not None and asking is None and moves_nothing_real(controller_of(rig))
+    )
+    person = Person(console, StatusReporter(rig, clock, (PlainView(console),)), asking, agrees=agreed)
+    text, hurry = motion.read_text(encoding="utf-8"), wanted.emulators.time_scale
+    run_motion(MotionJob(rig, wanted.text, wanted.out, plan, text, hurry), person, console, clock)
 
 
 def _session_by_hand(wanted: Wanted, hand: HandOptions, console: Console) -> None:

@@ -165,6 +165,19 @@ def _ended_early(
 
     The readers still run: whoever opened the recording closes it after them.
     """
+    reason = stopped(bench, writer, clock, why)
+    count, place, newest = session.taken, writer.path, ""
+    if earlier is not None and earlier.samples:
+        count, place = session.taken + earlier.samples, earlier.folder
+        newest = f" ({session.taken} of them in {writer.path.name})"
+    kept_text = f"samples kept in {place}: {count}{newest}"
+    if count:
+        kept_text += f"; `calibeam identify {place}` fits them"
+    return PartialResult(f"{reason}; {kept_text}")
+
+
+def stopped(bench: Stoppable, writer: RecordingWriter, clock: Clock, why: BaseException) -> str:
+    """Stops the arm, puts what there is on the disk; why it ended, and what of this failed, in one line."""
     reason = interruption(why) if isinstance(why, KeyboardInterrupt) else str(why)
     also: list[str] = []
     with uninterrupted():
@@ -177,14 +190,7 @@ def _ended_early(
             writer.flush()
         except RecordingError as error:
             also.append(str(error))
-    count, place, newest = session.taken, writer.path, ""
-    if earlier is not None and earlier.samples:
-        count, place = session.taken + earlier.samples, earlier.folder
-        newest = f" ({session.taken} of them in {writer.path.name})"
-    kept_text = f"samples kept in {place}: {count}{newest}"
-    if count:
-        kept_text += f"; `calibeam identify {place}` fits them"
-    return PartialResult("; ".join([reason, *dict.fromkeys(also), kept_text]))
+    return "; ".join([reason, *dict.fromkeys(also)])
 
 
 @contextmanager

@@ -140,7 +140,7 @@ def connected_tracker(
 ) -> Generator[TrackerBench]:
     """The bench of a tracker on wires, its readers running. At the end the arm is stopped, every port released."""
     tracker = tracker_driver(addresses.instrument, clock, addresses.hurry)
-    with _wires(rig, addresses, writer, clock, feed, partial(_pumped, tracker)) as wires:
+    with _wires(rig, addresses, writer, clock, feed, partial(pumped, tracker)) as wires:
         yield TrackerBench(*wires, rate_hz=addresses.instrument.rate_hz)
 
 
@@ -158,7 +158,7 @@ def connected(
 
     @contextmanager
     def read(kept: Kept) -> Generator[Pump]:
-        with _pumped(psd, kept, _spots_writer(psd, addresses.instrument, writer)) as pump:
+        with pumped(psd, kept, _spots_writer(psd, addresses.instrument, writer)) as pump:
             feed.sees(psd_view(psd, addresses.instrument))
             yield pump
 
@@ -184,15 +184,15 @@ def _wires(
         feed.stops_by(partial(supervisor.stop, StoppedError(PAGE_STOP)))  # while connecting, too
         kept = Kept(writer, clock, supervisor, feed)
         also = {
-            one.device.name: cleaning.enter_context(_pumped(one.device, kept, silence_s=one.silence_s))
+            one.device.name: cleaning.enter_context(pumped(one.device, kept, silence_s=one.silence_s))
             for one in other_drivers(addresses.others, clock)
         }
         instrument = cleaning.enter_context(read(kept))
-        pump, encoders = cleaning.enter_context(_pumped(robot.reader, kept)), None
+        pump, encoders = cleaning.enter_context(pumped(robot.reader, kept)), None
         if addresses.encoders is not None:
             driver = encoder_driver(addresses.encoders, clock, hurry=addresses.hurry)
-            encoders = cleaning.enter_context(_pumped(driver, kept))
-        cleaning.callback(_released, arm)
+            encoders = cleaning.enter_context(pumped(driver, kept))
+        cleaning.callback(released, arm)
         try:
             arm.connect()
         except DeviceError:
@@ -203,7 +203,7 @@ def _wires(
         yield gated_arm(arm, rig, pump), pumps, speeds, supervisor, clock, addresses.hurry, also
 
 
-def _released(arm: Movable) -> None:
+def released(arm: Movable) -> None:
     with uninterrupted():
         arm.close()
 
@@ -231,7 +231,7 @@ def newest_s(pump: Pump) -> float | None:
 
 
 @contextmanager
-def _pumped(
+def pumped(
     device: Device, kept: Kept, also: Callable[[Block], None] = lambda block: None, silence_s: float = SILENCE_S
 ) -> Generator[Pump]:
     """The device connected, its blocks going into the recording until left, to the live page and to `also`."""

@@ -1,5 +1,6 @@
 """The gate for a rig's arm: its kinematics, limits, cell and rates, all from the rig file and the identified model."""
 
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -72,8 +73,34 @@ def gated_arm(arm: Movable, rig: Rig, robot: Pump) -> GatedArm:
     return GatedArm(arm, RigArm.of_rig(rig), cell_of(rig), now)
 
 
-def gate_of(rig: Rig, solver: Solver, arm: SetPoints, clock: Clock, speed_share: float = 1.0) -> Gate:
-    """Ready to plan and run."""
-    solve_hz = solve_rate_hz(rig.motion.structural_hz, UR_STREAM_HZ)
-    stream = SetPointStream(hz=UR_STREAM_HZ, solve_hz=solve_hz, lag_s=rig.motion.lag_s)
-    return Gate(solver, pace_of(rig, speed_share), cell_of(rig), arm, stream, clock)
+@dataclass(frozen=True)
+class DeviceTime:
+    """A clock that runs with emulators of another pace; its start is that of the host's clock."""
+
+    host: Clock
+    hurry: float  # device seconds in one of the host
+
+    def now_s(self) -> float:
+        return self.hurry * self.host.now_s()
+
+    def sleep_s(self, seconds: float) -> None:
+        self.host.sleep_s(seconds / self.hurry)
+
+
+def gate_of(
+    rig: Rig, solver: Solver, arm: SetPoints, clock: Clock, speed_share: float = 1.0, hurry: float = 1.0
+) -> Gate:
+    """Ready to plan and run. `hurry`: device seconds in one of the host's; set-points go out as often as on site, so
+    that a faster device has fewer of them, and rounds them off over as many.
+    """
+    hz, plain = UR_STREAM_HZ / hurry, SetPointStream()
+    stream = SetPointStream(
+        hz=hz,
+        solve_hz=solve_rate_hz(rig.motion.structural_hz, hz),
+        lookahead_s=plain.lookahead_s * hurry,
+        lag_s=rig.motion.lag_s,
+        rested_s=plain.rested_s * hurry,
+        late_s=plain.late_s * hurry,
+    )
+    pace = pace_of(rig, speed_share)
+    return Gate(solver, pace, cell_of(rig), arm, stream, clock if hurry == 1.0 else DeviceTime(clock, hurry))

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from acquisition.motion.following import SetPoints
 from acquisition.recording import RigFileError
 from acquisition.recording.rig import Rig
+from acquisition.recording.rig.devices import RobotDevice
 from acquisition.wires.streams import Pump, Supervisor
 from calibeam.devices.recorder import uninterrupted
 from calibeam.devices.robot import emulated_robot, robot_of
@@ -84,10 +85,7 @@ def _resting(supervisor: Supervisor, pump: Pump, clock: Clock) -> Floats:
 @contextmanager
 def watched_joints(rig: Rig, clock: Clock) -> Generator[Callable[[], Floats]]:
     """Readings (joint,) of the rig's arm at rest, as often as asked; nothing that could move it is opened."""
-    device = rig.devices.robot
-    if device is None:
-        raise RigFileError(f"rig {rig.name}: no [devices.robot]; add it, with how the controller is reached")
-    reader = robot_of(device, clock).reader
+    reader = robot_of(controller_of(rig), clock).reader
     supervisor = Supervisor(lambda: None, clock)
     pump = Pump(reader, clock, lambda block: None, supervisor.failed)
     reader.connect()
@@ -98,20 +96,31 @@ def watched_joints(rig: Rig, clock: Clock) -> Generator[Callable[[], Floats]]:
         pump.stop()
 
 
+def controller_of(rig: Rig) -> RobotDevice:
+    """RigFileError: there is none in the rig."""
+    device = rig.devices.robot
+    if device is None:
+        raise RigFileError(f"rig {rig.name}: no [devices.robot]; add how the controller is reached")
+    return device
+
+
+def as_streamed(arm: Movable, device: RobotDevice) -> StreamedArm:
+    """DeviceRefused: it takes no set-points."""
+    if not hasattr(arm, "servo_joints"):
+        raise DeviceRefused(f"[devices.robot]: driver '{device.driver.value}' takes no set-points; use ur-rtde")
+    return arm  # pyright: ignore[reportReturnType] - asked for in the line above
+
+
 @contextmanager
 def streamed_robot(rig: Rig, clock: Clock, emulated: Mapping[str, Any] | None = None) -> Generator[StreamedRobot]:
     """The rig's controller, read and ready to move. At the end the arm is stopped and every line released.
 
     RigFileError: no controller in the rig. DeviceRefused: one that takes no set-points; and every DeviceError.
     """
-    device = rig.devices.robot
-    if device is None:
-        raise RigFileError(f"rig {rig.name}: no [devices.robot]; add how the controller is reached")
+    device = controller_of(rig)
     robot = robot_of(device if emulated is None else emulated_robot(device, emulated), clock)
     arm = robot.arm()
-    if not hasattr(arm, "servo_joints"):
-        raise DeviceRefused(f"[devices.robot]: driver '{device.driver.value}' takes no set-points; use ur-rtde")
-    streamed: StreamedArm = arm  # pyright: ignore[reportAssignmentType] - asked for in the line above
+    streamed = as_streamed(arm, device)
     supervisor, track = Supervisor(arm.hold, clock), Track()
     pump = Pump(robot.reader, clock, track.blocks.append, supervisor.failed)
     robot.reader.connect()

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from acquisition.recording.motion_plan import MotionPlan
 from acquisition.recording.rig import Rig
-from calibrate.diagnose.motion import LOOSE, link_prior, moments_in, planned_motion, stated_drivers
+from calibrate.diagnose.motion import LOOSE, link_prior, moments_in, planned_drivers
 from calibrate.errors import DataError
 from calibrate.model.effects.term import Form
 from calibrate.model.effects.torque import friction, masses_and_springs
@@ -49,7 +49,7 @@ class TorqueInformation:
 def torque_information(rig: Rig, plan: MotionPlan, noise_nm: float | None = None) -> TorqueInformation:
     """Of the motion as planned. DataError where neither noise nor masses are stated."""
     t_s = (np.arange(MOMENTS) + 0.5) * plan.length_s / MOMENTS
-    drivers = stated_drivers(rig, planned_motion(t_s, *(plan.at(t_s, k) for k in range(4))))
+    drivers = planned_drivers(rig, t_s, [plan.at(t_s, k) for k in range(4)])
     loads = np.sqrt(np.mean(drivers.torque_nm**2, axis=0))
     noise = _noise(rig, loads, noise_nm)
     moment, joint = np.nonzero(np.abs(drivers.qd) >= drivers.still_rad_s)

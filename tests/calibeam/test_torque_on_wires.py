@@ -12,22 +12,15 @@ from pathlib import Path
 from typing import Any
 
 import mujoco
-import numpy as np
 import pytest
 
-from acquisition.recording import RecordingWriter
-from acquisition.wires.streams import Pump
 from calibeam.cli import run
-from drivers.clock import SystemClock
-from drivers.ur.control import UrControl
-from drivers.ur.reader import UrReader
+from calibrate.excitation import fourier
 from simulators.ur.readout import TORQUE_PER_CURRENT_NM_A
 
 RIG = Path(__file__).parents[2] / "rigs" / "ur5e-dual-psd.toml"
 FRICTION_NM = 4.0
-MIDDLE_RAD = np.array([0.3, -1.4, 1.4, -0.8, 0.5, 0.0])
-REACH_RAD = np.array([1.0, 0.5, 0.8, 1.0, 1.0, 1.5])
-MOVES = 16
+TIME_SCALE = 2
 
 
 def rig_text() -> str:
@@ -47,7 +40,7 @@ def rig_text() -> str:
 def emulated(rig: Path) -> Iterator[str]:
     """Address of the robot of `calibeam emulate --hide`."""
     hidden = ["--hide", f"coulomb joint3 {FRICTION_NM}"]
-    served = ["--json", "--end-with-stdin", "--robot-host", "auto", "--time-scale", "4", *hidden]
+    served = ["--json", "--end-with-stdin", "--robot-host", "auto", "--time-scale", str(TIME_SCALE), *hidden]
     command = [sys.executable, "-m", "calibeam", "emulate", str(rig), *served]
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
         assert process.stdin is not None
@@ -57,28 +50,18 @@ def emulated(rig: Path) -> Iterator[str]:
         process.wait(10.0)
 
 
-def record_motion(host: str, path: Path) -> None:
-    """A robot on its ways between drawn poses, at several speeds."""
-    rng, clock, failures = np.random.default_rng(4), SystemClock(), []
-    control, reader = UrControl(host), UrReader(host, clock=clock)
-    control.connect()
-    try:
-        control.move_joints(MIDDLE_RAD, 2.0, 10.0)
-        with RecordingWriter(path, rig_text=rig_text(), software="test", clock=clock) as writer:
-            reader.connect()
-            stream = writer.stream(reader.name, reader.describe(), stamps="sampled")
-            pump = Pump(
-                reader, clock, lambda b: stream.append(b.host_s, b.device_s, b.sequence, b.values), failures.append
-            )
-            pump.start()
-            for _ in range(MOVES):
-                goal_rad = MIDDLE_RAD + REACH_RAD * rng.uniform(-1.0, 1.0, 6)
-                control.move_joints(goal_rad, rng.uniform(0.5, 1.5), rng.uniform(2.0, 5.0))
-            pump.stop()
-    finally:
-        control.close()
-        reader.close()
-    assert not failures
+def moved(rig: Path, host: str) -> Path:
+    """The session folder of an exciting motion."""
+    motion, reached, out = (rig.with_name(name) for name in ("motion.toml", "reached.toml", "moved"))
+    with pytest.MonkeyPatch.context() as patch:  # as many drawn motions as a test needs
+        patch.setattr(fourier, "DRAWN", 6)
+        patch.setattr(fourier, "STEPS", 6)
+        words = ["excite", str(rig), "--out", str(motion), "--length-s", "10", "--repeats", "2"]
+        assert run([*words, "--speed-share", "0.8"]) == 0
+    reached.write_text(re.sub(r'host = ".*"', f'host = "{host}"', rig_text()), encoding="utf-8")
+    words = ["session", str(reached), "--motion", str(motion), "--out", str(out), "--yes"]
+    assert run([*words, "--time-scale", str(TIME_SCALE)]) == 0
+    return out
 
 
 @pytest.fixture(scope="module")
@@ -87,8 +70,7 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("motion")
     (folder / "rig.toml").write_text(rig_text(), encoding="utf-8")
     with emulated(folder / "rig.toml") as host:
-        record_motion(host, folder / "motion.mcap")
-    return folder / "motion.mcap"
+        return moved(folder / "rig.toml", host)
 
 
 def of_controller(finding: dict[str, Any]) -> bool:
@@ -129,5 +111,5 @@ def test_a_model_of_it_moves_on_in_mujoco_and_knows_what_is_not_new(recorded: Pa
     assert loaded.dof_frictionloss[2] == pytest.approx(FRICTION_NM, rel=0.02)
     assert run(["diagnose", str(recorded), "--model", str(model), *own]) == 0
     said = json.loads((tmp_path / "diagnosis.json").read_text(encoding="utf-8"))
-    assert said["torques"]["known"] == "motion.mcap"
+    assert said["torques"]["known"]
     assert [one for one in said["findings"] if one["share"] > 0.01 and one["where"] == "joint3.torque"] == []

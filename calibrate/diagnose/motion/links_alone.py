@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from acquisition.recording.rig import Rig
 from calibrate.diagnose.motion.link_prior import link_prior
-from calibrate.diagnose.motion.motion_table import Motion
+from calibrate.diagnose.motion.motion_table import Motion, planned_motion
 from calibrate.diagnose.motion.torque_problem import TorqueProblem
 from calibrate.diagnose.motion.torque_state import TorqueState, with_torque
 from calibrate.errors import DataError
@@ -60,9 +60,11 @@ def torque_state(rig: Rig, motion: Motion, known: TorquesOfModel | None = None) 
     return first.refitted(()).renewed()
 
 
-def stated_drivers(rig: Rig, motion: Motion) -> MotionDrivers:
-    """Under the load of the links that the rig file states."""
-    return with_torque(motion_drivers(rig, motion), link_prior(rig).stated)
+def planned_drivers(rig: Rig, time_s: Floats, moved: Sequence[Floats]) -> MotionDrivers:
+    """Of a plan, under the load of the links that the rig file states; `moved`: angles, speeds, accelerations, jerks,
+    (moment, joint) each.
+    """
+    return with_torque(motion_drivers(rig, planned_motion(time_s, *moved)), link_prior(rig).stated)
 
 
 def expected_nm(rig: Rig, motion: Motion, known: TorquesOfModel) -> Floats:

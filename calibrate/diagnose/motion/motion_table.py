@@ -60,8 +60,23 @@ class Motion:
         )
 
 
+@dataclass(frozen=True, eq=False)
+class Filtered:
+    """Every stretch of a recording behind the low pass."""
+
+    runs: "list[Run]"
+    band_hz: float
+    period_s: float
+
+
 def motion_of(recording: Recording) -> Motion | None:
     """None without joint angles and torques of one and the same time, or where they are too few."""
+    made = filtered_of(recording)
+    return None if made is None or not made.runs else _thinned(made.runs, recording, made.band_hz, made.period_s)
+
+
+def filtered_of(recording: Recording) -> Filtered | None:
+    """None without joint angles and torques of one and the same time."""
     devices = devices_of(recording)
     joints, torque = devices.get("joints"), devices.get("torque")
     n = recording.rig.n_joints
@@ -84,7 +99,7 @@ def motion_of(recording: Recording) -> Motion | None:
     runs = [
         _filtered(time_s[run], q_rad[run], torque_nm[run], band_hz, period_s) for run in _runs(whole, band_hz, period_s)
     ]
-    return _thinned(runs, recording, band_hz, period_s) if runs else None
+    return Filtered(runs, band_hz, period_s)
 
 
 def planned_motion(time_s: Floats, q: Floats, qd: Floats, qdd: Floats, jerk: Floats) -> Motion:
@@ -110,7 +125,7 @@ def _on_clock_of(joints: StreamDevice, torque: StreamDevice) -> Track | None:
 
 
 @dataclass(frozen=True, eq=False)
-class _Run:
+class Run:
     """At every sample of a stretch without gap: (sample, joint) each."""
 
     time_s: Floats
@@ -130,7 +145,7 @@ def _runs(whole: Flags, band_hz: float, period_s: float) -> list[NDArray[np.intp
     return [part for part in parts if len(part) >= least]
 
 
-def _filtered(time_s: Floats, q_rad: Floats, torque_nm: Floats, band_hz: float, period_s: float) -> _Run:
+def _filtered(time_s: Floats, q_rad: Floats, torque_nm: Floats, band_hz: float, period_s: float) -> Run:
     smooth = _low_pass(q_rad, band_hz, period_s)
     speed = np.gradient(smooth, period_s, axis=0)
     noise = SIGMA_OF_MEDIAN * np.median(np.abs(q_rad - smooth), axis=0)
@@ -141,7 +156,7 @@ def _filtered(time_s: Floats, q_rad: Floats, torque_nm: Floats, band_hz: float, 
     edge = round(EDGE_PERIODS / band_hz / period_s)
     inside = slice(edge, len(time_s) - edge)
     moved = smooth[inside], speed[inside], acceleration[inside], jerk[inside]
-    return _Run(time_s[inside], *moved, torque[inside], noise)
+    return Run(time_s[inside], *moved, torque[inside], noise)
 
 
 def _low_pass(values: Floats, band_hz: float, period_s: float) -> Floats:
@@ -151,7 +166,7 @@ def _low_pass(values: Floats, band_hz: float, period_s: float) -> Floats:
     return np.asarray(sosfiltfilt(sections, values, axis=0), dtype=np.float64)
 
 
-def _thinned(runs: list[_Run], recording: Recording, band_hz: float, period_s: float) -> Motion | None:
+def _thinned(runs: list[Run], recording: Recording, band_hz: float, period_s: float) -> Motion | None:
     speed, acceleration = _gains(band_hz, period_s)
     noise = np.max([run.noise_rad for run in runs], axis=0)
     fastest = np.max([np.abs(run.qd_rad_s).max(axis=0) for run in runs], axis=0)
@@ -165,7 +180,7 @@ def _thinned(runs: list[_Run], recording: Recording, band_hz: float, period_s: f
     return Motion(time_s, q, qd, qdd, jerk, torque, still, heat, band_hz, speed * noise, acceleration * noise)
 
 
-def _rows(run: _Run, still: Floats, window: int, step: int) -> tuple[Floats, ...]:
+def _rows(run: Run, still: Floats, window: int, step: int) -> tuple[Floats, ...]:
     """Every `step`-th sample; torques of joints that stand or turn back within `window` samples are NaN."""
     sense = np.where(np.abs(run.qd_rad_s) < still, 0.0, np.sign(run.qd_rad_s))
     steady = sense != 0.0

@@ -297,6 +297,10 @@ def _ur(folder: Path) -> None:
     )
     plan = f'schema = 1\nrig = "ur5e-dual-psd"\npurpose = ["a test"]\n[[block]]\nplacement = 1\nfirst_psd = 1\n{poses}'
     (folder / "plan.toml").write_text(plan, encoding="utf-8")
+    series = "[[joint]]\nmiddle_rad = 0.1\nsine_rad = [0.2, -0.1]\ncosine_rad = [0.2, -0.05]\n"
+    motion = f'schema = 1\nrig = "{load_rig(folder / "rig.toml").name}"\nlength_s = 9.0\nrepeats = 2\n'
+    motion += series * load_rig(folder / "rig.toml").n_joints
+    (folder / "motion.toml").write_text(motion, encoding="utf-8")
     spots = "\n".join(f"{x:.3f},{y:.3f}" for x in (-0.006, -0.002, 0.002, 0.006) for y in (-0.006, 0.0, 0.006))
     (folder / "poses.csv").write_text(POSES, encoding="utf-8")
     for suffix, program in {"src": WELD, "script": URSCRIPT, "mod": RAPID, "ls": FANUC}.items():

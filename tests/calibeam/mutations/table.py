@@ -218,6 +218,7 @@ RIGS = (
 )
 PLANS = (
     Pair("cycles.toml", "iso9283 evaluate cycled --plan cycles.toml --out made.json"),
+    Pair("motion.toml", "session rig.toml --motion motion.toml --out made --yes"),
     Pair("plan.toml", "session rig.toml --plan plan.toml --out made --yes"),
     Pair("fit.toml", "identify tracker --plan fit.toml"),
     Pair("task.toml", "move rig.toml --task task.toml --position bin --dry-run"),

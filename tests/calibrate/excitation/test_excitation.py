@@ -8,7 +8,7 @@ import pytest
 
 from acquisition.recording.rig import load_rig, parse_rig
 from calibeam.motion.exciting_motion import check_motion, clear_motion
-from calibrate.diagnose.motion import stated_drivers
+from calibrate.diagnose.motion import planned_drivers
 from calibrate.diagnose.motion.links_alone import torque_state
 from calibrate.diagnose.motion.motion_table import Motion
 from calibrate.diagnose.motion.torque_state import with_noise
@@ -68,7 +68,7 @@ def test_sigmas_are_those_of_a_fit_to_drawn_noise(made) -> None:
     q, qd, qdd, jerk = (plan.at(t_s, k) for k in range(4))
     still = 0.02 * np.abs(qd).max(axis=0)
     none = np.zeros(6)
-    links = stated_drivers(RIG, Motion(t_s, q, qd, qdd, jerk, q, still, None, 20.0, none, none)).torque_nm
+    links = planned_drivers(RIG, t_s, (q, qd, qdd, jerk)).torque_nm
     for _ in range(16):
         torque = np.where(np.abs(qd) < still, np.nan, links + NOISE_NM * rng.standard_normal(q.shape))
         state = torque_state(RIG, Motion(t_s, q, qd, qdd, jerk, torque, still, None, 20.0, none, none))
