@@ -21,6 +21,8 @@ from calibrate.model.torque_records import TorquesOfModel
 
 Floats = NDArray[np.float64]
 
+LEAST_KG_M2 = 1e-6  # of the smallest inertia of a body, as `boundinertia` of the file
+
 
 @dataclass(frozen=True)
 class Body:
@@ -136,5 +138,7 @@ def _body(T_body_link: Floats, link: Floats) -> Body:
     centre = link[1 : len(NUMBERS) - 6] / mass
     xx, yy, zz, xy, xz, yz = link[4:]
     about = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) + mass * cross_matrix(centre) @ cross_matrix(centre)
-    turned = R @ about @ R.T
+    w = np.linalg.eigvalsh(about)
+    short = LEAST_KG_M2 + max(0.0, -float(w[0]), float(w[2] - w[1] - w[0]))
+    turned = R @ about @ R.T + short * np.eye(3)  # points, rods and plates are no bodies to MuJoCo
     return Body(mass, R @ centre + T_body_link[:3, 3], turned[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]])
