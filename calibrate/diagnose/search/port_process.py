@@ -25,7 +25,7 @@ from calibrate.model.effects.curve import (
     frequencies,
     unit,
 )
-from calibrate.model.effects.ports import Port
+from calibrate.model.effects.ports import JOINT, Place, Port
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -192,14 +192,16 @@ def lever(bench: Bench, port: Port, component: int) -> Floats:
 def places_of(bench: Bench) -> tuple[tuple[Port, int], ...]:
     """Ports of the catalogue and the components where a candidate acts.
 
-    Lengths of links are left to geometry, and what a late clock does at each joint to the joint itself.
+    Lengths of links are left to geometry, and what a late clock, a load or a leaning base does at each joint to the
+    joint itself.
     """
     found: dict[tuple[Port, int], tuple[Port, int]] = {}
     drivers = bench.state.drivers
     for term in {(t.port, t.physics): t for t in bench.candidates}.values():
         inner = np.array([spec.grid[len(spec.grid) // 2] for spec in term.inner])
         where = term.port.where
-        if where == TIME or term.port.past_encoders or (where.startswith("link") and not where.endswith(".tilt")):
+        of_arm = term.port.place is Place.JOINTS and not where.startswith(JOINT)
+        if of_arm or term.port.past_encoders or (where.startswith("link") and not where.endswith(".tilt")):
             continue
         acts = np.any(term.basis(drivers, inner) != 0.0, axis=(0, 2))
         for component in np.flatnonzero(acts):
