@@ -31,6 +31,7 @@ from benchmarks import (
     log_cost,
     measuring_arm,
     motion,
+    motion_rivals,
     panda_motion,
     plan_taken,
     proof_comparison,
@@ -136,6 +137,12 @@ def run_panda_motion() -> None:
     print("torques of a real 7-axis robot: learned from the first 70 % of a motion, proved on the rest")
     for row in panda_motion.lines(Path(os.environ.get("PANDA_MOTION", "rbt_log"))):
         print(row)
+
+
+def run_motion_rivals() -> None:
+    print("cases of a finished proof of motions: other methods on the same moments, judged on the unseen end")
+    for row in motion_rivals.lines(Path(os.environ.get("PROOF_MOTION", RIG.parents[1] / "out" / "proof-motion"))):
+        print(row, flush=True)
 
 
 def run_sockets() -> None:
@@ -298,6 +305,7 @@ BENCHMARKS: dict[str, Callable[[], None]] = {
     "real": run_real,
     "motion": run_motion,
     "panda_motion": run_panda_motion,
+    "motion_rivals": run_motion_rivals,
     "sockets": run_sockets,
     "proof": run_proof,
     "diagnosis_speed": run_diagnosis_speed,

@@ -9,7 +9,7 @@ import csv
 import io
 import tempfile
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -86,10 +86,21 @@ def left_nm(rig: Rig, motion: Motion, known: TorquesOfModel) -> Floats:
     return rms(motion.torque_nm - expected_nm(rig, motion, known))
 
 
+@dataclass(frozen=True, eq=False)
+class PlainFit:
+    """Least squares of links, rotors and the usual friction, in one step."""
+
+    left_nm: Floats  # (joint,) rms of what it leaves of a motion that it has not seen
+    friction: dict[tuple[str, str], float]  # by physics and joint<i>.torque
+
+
 def left_by_least_squares_nm(rig: Rig, seen: Motion, unseen: Motion) -> Floats:
-    """The same of links, rotors and the usual friction, every joint by the spread of its torque, in one step without
-    weights.
-    """
+    """(joint,) rms of what least squares leaves of a motion that it has not seen."""
+    return by_least_squares(rig, seen, unseen).left_nm
+
+
+def by_least_squares(rig: Rig, seen: Motion, unseen: Motion) -> PlainFit:
+    """Every joint by the spread of its torque, without weights."""
     bare, new = torque_state(rig, seen), torque_state(rig, unseen).whole
     full = bare.refitted(usual_friction(bare))
     problem = full.problem
@@ -99,7 +110,8 @@ def left_by_least_squares_nm(rig: Rig, seen: Motion, unseen: Motion) -> Floats:
     size = np.maximum(np.linalg.norm(columns, axis=0), 1e-12)
     theta = np.linalg.lstsq(columns / size, problem.observed_nm * scale, rcond=1e-9)[0] / size
     other = replace(new, terms=problem.terms, sizes=problem.sizes)
-    return _rms_of_joint(other.joint, other.misfit_nm(theta))
+    friction = {(a.term.physics, a.term.port.where): float(a.coefficients[0]) for a in problem.split(theta)[1]}
+    return PlainFit(_rms_of_joint(other.joint, other.misfit_nm(theta)), friction)
 
 
 def rms(values: Floats) -> Floats:

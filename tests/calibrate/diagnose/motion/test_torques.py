@@ -10,6 +10,10 @@ from acquisition.recording.rig.schema import Follows
 from benchmarks.drawn_motion import Hidden, recorded
 from calibrate.diagnose.assess.diagnosis import Verdict
 from calibrate.diagnose.motion import diagnose_torques
+from calibrate.diagnose.motion.links_alone import torque_state
+from calibrate.diagnose.motion.motion_table import motion_of
+from calibrate.diagnose.search.bench import Bench
+from calibrate.diagnose.search.port_process import places_of
 
 OF_ITS_SIZE = 0.02
 
@@ -121,3 +125,12 @@ def test_a_delay_is_found_in_a_long_motion_too():
     (found,) = diagnosed(Hidden(delay={2: 0.01}), length_s=120.0).findings
     assert found.name.physics == "torque-delay"
     assert found.parameters["delay_s"].value == pytest.approx(0.01, rel=OF_ITS_SIZE)
+
+
+def test_an_unknown_cause_is_sought_at_the_joints_alone() -> None:
+    """What a load or a leaning base does at one joint alone would be a second name for the torque of that joint."""
+    recording = recorded(Hidden(), length_s=5.0)
+    motion = motion_of(recording)
+    assert motion is not None
+    places = {port.where for port, _ in places_of(Bench(torque_state(recording.rig, motion)))}
+    assert places == {f"joint{i}.torque" for i in range(1, recording.rig.n_joints + 1)}
