@@ -25,8 +25,9 @@ from calibeam.prove.record import UNKNOWN, TrueDefect, Truth, truth_of
 from calibeam.prove.scoring import PASSED
 from calibeam.prove.seal import Layout
 from calibeam.worker_processes import in_workers
-from calibrate.diagnose.motion import motion_in_two, reconcile_motion
+from calibrate.diagnose.motion import reconcile_motion
 from calibrate.diagnose.motion.motion_table import Motion, motion_of
+from calibrate.diagnose.motion.unseen_motion import motion_in_two
 
 Floats = NDArray[np.float64]
 
