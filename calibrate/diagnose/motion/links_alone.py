@@ -16,8 +16,8 @@ from calibrate.errors import DataError
 from calibrate.model.arms.catalogue import arm_of
 from calibrate.model.arms.inverse_dynamics import torque_columns
 from calibrate.model.arms.serial import SerialArm
-from calibrate.model.effect_records import EffectCurve, EffectRecord
-from calibrate.model.effects.curve import TORQUE, UNKNOWN, cause
+from calibrate.model.effect_records import EffectRecord
+from calibrate.model.effects.curve import TORQUE, UNKNOWN, cause, features_within
 from calibrate.model.effects.term import Accepted, Shape, Term
 from calibrate.model.effects.torque import MotionDrivers, at_torque, torque_terms
 from calibrate.model.parameters import start_values
@@ -112,7 +112,7 @@ def motion_drivers(rig: Rig, motion: Motion, known: TorquesOfModel | None = None
         link_columns=_with_rotors(columns, qdd),
         rate_columns=_with_rotors(of_rate, motion.jerk_rad_s3),
         lean_columns=_with_rotors(of_lean, none),
-        last_link=columns[:, :, -1, :4],
+        last_link=columns[:, :, -1],
         tilted=np.zeros((*qd.shape, 2)),
         still_rad_s=motion.still_rad_s,
         middle_rad=middle_rad,
@@ -149,19 +149,19 @@ def listed_torques(effects: Sequence[EffectRecord], drivers: MotionDrivers) -> t
     """
     terms = torque_terms(drivers)
     listed = [_accepted(one, term) for one in effects for term in terms if _is(one, term)]
-    return (*listed, *(_drawn(one, one.curve, drivers.n_joints) for one in effects if one.curve is not None))
+    return (*listed, *(_drawn(one, one.waves, drivers.n_joints) for one in effects if one.waves is not None))
 
 
-def _drawn(effect: EffectRecord, curve: EffectCurve, n: int) -> Accepted:
-    """An unknown cause of one driver, through the knots of its curve; beyond them as at the last one."""
-    knots, values = np.array(curve.knots), np.array(curve.values)
+def _drawn(effect: EffectRecord, waves: int, n: int) -> Accepted:
+    """An unknown cause, over the range of its drivers; beyond it as at its end."""
+    names = tuple(effect.depends_on.split(","))
 
     def law(d: MotionDrivers, inner: Floats) -> Floats:
-        return np.interp(cause(d, curve.driver), knots, values)[:, None]
+        return features_within([cause(d, name) for name in names], [effect.range[name] for name in names], waves)
 
-    joint = int(effect.where.removeprefix("joint").removesuffix(TORQUE))
-    term = at_torque(joint, n, UNKNOWN, Shape.LINEAR, (curve.driver,), law, ("share",), np.inf, effect.says)
-    return Accepted(term, np.ones(1), np.zeros(0))
+    joint, coefficients = int(effect.where.removeprefix("joint").removesuffix(TORQUE)), [*effect.coefficients.values()]
+    term = at_torque(joint, n, UNKNOWN, Shape.SMOOTH, names, law, (), np.inf, effect.says)
+    return Accepted(term, np.array(coefficients, dtype=float), np.zeros(0))
 
 
 def _is(effect: EffectRecord, term: Term) -> bool:

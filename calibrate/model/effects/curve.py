@@ -5,7 +5,7 @@ Eigenfunctions of a box stand in for a Gaussian process. Source: Solin, Sarkka, 
 Gaussian process regression, Stat. Comput. 30, 2020, section 3.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -159,8 +159,18 @@ def unit(port: Port, component: int) -> Unit:
 
 def features(causes: list[Floats], waves: int) -> Floats:
     """(pose, waves ** driver) sines on the box around -1 ... 1."""
+    return _sines([centred(x) for x in causes], waves)
+
+
+def features_within(causes: list[Floats], ranges: Sequence[tuple[float, float]], waves: int) -> Floats:
+    """The same of drivers that once had these ranges; beyond them as at their ends."""
+    pairs = zip(causes, ranges, strict=True)
+    return _sines([centred(np.array([*r, *np.clip(x, *r)]))[2:] for x, r in pairs], waves)
+
+
+def _sines(centred_causes: list[Floats], waves: int) -> Floats:
     order = np.arange(1, waves + 1)
-    each: list[Floats] = [np.sin(np.pi * order * (centred(x)[:, None] + BOX) / (2.0 * BOX)) for x in causes]
+    each: list[Floats] = [np.sin(np.pi * order * (x[:, None] + BOX) / (2.0 * BOX)) for x in centred_causes]
     out = each[0]
     for other in each[1:]:
         out = (out[:, :, None] * other[:, None, :]).reshape(len(out), -1)

@@ -6,13 +6,12 @@ from pathlib import Path
 import mujoco
 import numpy as np
 import pytest
-from calibrate.diagnose.motion.known_torques import listed_torques
 from msgspec import structs
 from scipy.spatial.transform import Rotation
 
 from acquisition.recording.rig import load_rig
 from calibeam.simulation.described_torques import described_torques
-from calibrate.diagnose.motion.links_alone import motion_drivers
+from calibrate.diagnose.motion.links_alone import listed_torques, motion_drivers
 from calibrate.diagnose.motion.motion_table import Motion
 from calibrate.errors import DataError
 from calibrate.model.arms.catalogue import arm_of

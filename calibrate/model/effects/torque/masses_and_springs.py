@@ -43,7 +43,10 @@ def _payload(drivers: Drivers) -> tuple[Term, ...]:
             Shape.LINEAR,
             "payload",
             function=function,
-            names=("mass_kg", "moment_x_kg_m", "moment_y_kg_m", "moment_z_kg_m"),
+            names=(
+                *("mass_kg", "moment_x_kg_m", "moment_y_kg_m", "moment_z_kg_m"),
+                *(f"tensor_{axes}_kg_m2" for axes in ("xx", "yy", "zz", "xy", "xz", "yz")),
+            ),
             limit=LIMIT_KG,
             sentence="The flange carries {mass_kg} more than its model, with first moments of {moment_x_kg_m}, "
             "{moment_y_kg_m}, {moment_z_kg_m} along x, y, z of the flange",

@@ -25,7 +25,7 @@ class MotionDrivers(Drivers):
     link_columns: Floats  # (moment * joint, link number) torque for one unit of each number of each link
     rate_columns: Floats  # (moment * joint, link number) the same of its derivative by time
     lean_columns: Floats  # (moment * joint * 2, link number) its change for one radian that gravity leans about x, y
-    last_link: Floats  # (moment, joint, 4) torque for one kg and one kg m along x, y, z of the flange
+    last_link: Floats  # (moment, joint, 10) torque for one unit of each number of what the flange carries
     tilted: Floats  # (moment, joint, 2) torque for one radian by which gravity leans about x, y of the base
     still_rad_s: Floats  # (joint,) below this speed it is open which way a joint turns
     middle_rad: Floats  # (joint,) what the way of a spring is counted from

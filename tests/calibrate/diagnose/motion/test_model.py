@@ -2,6 +2,7 @@
 MuJoCo.
 """
 
+from dataclasses import replace
 from pathlib import Path
 
 import mujoco
@@ -19,6 +20,7 @@ from calibrate.model.torque_records import TorquesOfModel
 
 MARCH = Hidden(coulomb={3: 4.0, 2: 2.0}, viscous={1: 6.0}, spring={4: 3.0})
 NOW = Hidden(coulomb={3: 6.0, 2: 1.0}, viscous={1: 6.0}, spring={4: 3.0}, payload_kg=1.0)
+WAVE_NM = 3.0
 NOISE_NM = 0.0285  # of 0.1 Nm a reading at 500 Hz, behind the low pass of 20 Hz
 
 
@@ -98,3 +100,26 @@ def test_bodies_are_found_that_take_the_torques_of_links_that_no_body_has() -> N
     assert is_physical(bodies)
     assert rise == pytest.approx(0.0, abs=1e-2)
     assert seen @ bodies == pytest.approx(seen @ links, abs=0.1)
+
+
+def test_a_cause_without_a_name_is_expected_again(tmp_path: Path) -> None:
+    """A wave of the joint's own angle that is no order of the motor, found at one motion and expected at another."""
+    first, second = (with_wave(recorded(Hidden(), seed=seed)) for seed in (1, 2))
+    found = diagnose_torques(first, np.random.default_rng(1))
+    assert found is not None
+    (effect,) = torques_of_model(found, "wave").effects
+    assert (effect.physics, effect.where, effect.depends_on) == ("unknown", "joint2.torque", "q2")
+    seen = motion(second)
+    misfit = expected_nm(second.rig, seen, torques_of_model(found, "wave")) - seen.torque_nm
+    q2 = motion(first).q_rad[:, 1]
+    inside = (seen.q_rad[:, 1] > q2.min()) & (seen.q_rad[:, 1] < q2.max())
+    assert np.sqrt(np.nanmean(misfit[inside, 1] ** 2)) < 0.15 * WAVE_NM
+
+
+def with_wave(recording: Recording) -> Recording:
+    """With a torque at joint 2 that rises and falls with its angle."""
+    stream = recording.streams["robot"]
+    torque = stream.values["joint_torque_nm"].copy()
+    torque[:, 1] += WAVE_NM * np.sin(5.0 * stream.values["actual_q_rad"][:, 1])
+    values = {**stream.values, "joint_torque_nm": torque}
+    return replace(recording, streams={"robot": replace(stream, values=values)})

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from acquisition.recording import Event
+from acquisition.recording.motion_plan import MOTION_EVENT
 from benchmarks.drawn_motion import Hidden, recorded
-from calibrate.diagnose.motion import MOTION_EVENT, scatter_of_repeats
+from calibrate.diagnose.motion import scatter_of_repeats
 
 LENGTH_S, REPEATS, PERIOD_S, NOISE_NM = 5.0, 3, 0.002, 0.2
 BAND_SHARE = np.sqrt(2.0 * 20.0 * PERIOD_S)  # of white noise that a low pass of 20 Hz leaves
