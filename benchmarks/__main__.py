@@ -31,6 +31,7 @@ from benchmarks import (
     log_cost,
     measuring_arm,
     motion,
+    motion_cost,
     motion_rivals,
     panda_motion,
     plan_taken,
@@ -130,6 +131,11 @@ def run_real() -> None:
 def run_motion() -> None:
     print("torques of a real robot in motion: learned from record A, proved on record B, which no fit has seen")
     for row in motion.lines(RIG.parents[2] / "shared" / "data" / "kr300-encoders"):
+        print(row)
+
+
+def run_motion_cost() -> None:
+    for row in motion_cost.lines():
         print(row)
 
 
@@ -304,6 +310,7 @@ BENCHMARKS: dict[str, Callable[[], None]] = {
     "designed_poses": run_designed_poses,
     "real": run_real,
     "motion": run_motion,
+    "motion_cost": run_motion_cost,
     "panda_motion": run_panda_motion,
     "motion_rivals": run_motion_rivals,
     "sockets": run_sockets,
