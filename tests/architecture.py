@@ -202,8 +202,8 @@ def figures() -> tuple[Figure, ...]:
 
 
 TODAY = {
-    "files": 818,
-    "code": 88_600,
+    "files": 817,
+    "code": 87_800,
     "longest_function": 53,
     "one_importer": 2,
     "classes": 0,
