@@ -22,6 +22,7 @@ LATER = (
     "calibrate.error_simulation",
     "calibrate.iso9283",
     "calibrate.design",
+    "calibrate.excitation",
     "calibrate.tool_axes",
     "calibrate.verify",
 )

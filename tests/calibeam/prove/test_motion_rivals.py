@@ -12,8 +12,9 @@ from benchmarks.motion import by_least_squares
 from benchmarks.motion_rivals import METHODS, Answer, size_error, table, without_masses
 from benchmarks.rival_sysid import every_key, fitted, inverse_nm, keys_of, spec_of
 from calibeam.prove.record import TrueDefect
-from calibrate.diagnose.motion import expected_nm, motion_in_two, torques_of_rig
+from calibrate.diagnose.motion import expected_nm, torques_of_rig
 from calibrate.diagnose.motion.motion_table import Motion, motion_of
+from calibrate.diagnose.motion.unseen_motion import motion_in_two
 
 FRICTION = TrueDefect("coulomb", "coulomb-friction", "joint3.torque", ("qd3",), {"friction_nm": 2.0}, 5.0)
 DELAY = TrueDefect("late-torque", "torque-delay", "joint3.torque", ("dtau3",), {"delay_s": 5e-3}, 5.0)
