@@ -140,7 +140,7 @@ def _learned(followed: Followed, model: Any, cut: int) -> tuple[Servo, Floats]:
 
 
 def _slow(values: Floats, period_s: float) -> Floats:
-    """(sample, ...) behind one zero-phase low pass: what is linear stays so; chatter from set-point to set-point goes."""
+    """(sample, ...) behind one zero-phase low pass: what is linear stays, chatter from set-point to set-point goes."""
     sections = butter(4, min(2.0 * LEARNED_HZ * period_s, 0.5), output="sos")
     return np.asarray(sosfiltfilt(sections, values, axis=0), dtype=np.float64)
 
