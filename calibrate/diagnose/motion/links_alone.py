@@ -114,6 +114,7 @@ def motion_drivers(rig: Rig, motion: Motion, known: TorquesOfModel | None = None
         lean_columns=_with_rotors(of_lean, none),
         last_link=columns[:, :, -1],
         tilted=np.zeros((*qd.shape, 2)),
+        samples=motion.samples,
         still_rad_s=motion.still_rad_s,
         middle_rad=middle_rad,
         temperature_degC=heat,

@@ -2,12 +2,15 @@
 
 Speed and acceleration are slopes of the recorded angles behind a zero-phase low pass; the torque passes the same one,
 so that what is linear in it loses nothing (parallel filtering: Gautier, Dynamic identification of robots with power
-model, ICRA 1997). Rows stand as far apart as the low pass makes them independent.
+model, ICRA 1997). What changes faster than that, the sense of motion or ripple of a gear, passes it, too, from sample
+to sample. Rows stand as far apart as the low pass makes them independent.
 
 Where a joint stands or turns back, friction is anything between its two senses: its torque there is left out.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +19,7 @@ from acquisition.recording import Recording
 from calibrate.diagnose.streams import StreamDevice, Track, devices_of
 from calibrate.diagnose.streams.recorded import start_between
 from calibrate.diagnose.streams.track import SIGMA_OF_MEDIAN
+from calibrate.model.effects.torque import Samples
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -27,7 +31,8 @@ MOST_ROWS = 600  # of six torques: more cost time and show hardly more
 FEWEST_ROWS = 60
 LEAST_RUN_S = 1.0  # without a gap
 EDGE_PERIODS = 3.0  # of the band, that are left out at the ends of a run
-TURN_PERIODS = 2.0  # and before and after a joint turns back: the low pass rings there
+TURN_PERIODS = 0.5  # and before and after a joint turns back
+STAND_PERIODS = 2.0  # and before and after it stands: what friction is there nothing says, and the low pass spreads it
 STILL_SHARE = 0.02  # of a joint's greatest speed; below it is taken to stand
 STILL_SIGMAS = 4.0
 TEMPERATURE = "joint_temperature_degC"
@@ -48,6 +53,7 @@ class Motion:
     band_hz: float
     speed_sigma_rad_s: Floats  # (joint,) that the noise of the angles leaves
     acceleration_sigma_rad_s2: Floats  # (joint,)
+    samples: Samples  # from which the moments were taken
 
     @property
     def made(self) -> str:
@@ -105,7 +111,8 @@ def filtered_of(recording: Recording) -> Filtered | None:
 def planned_motion(time_s: Floats, q: Floats, qd: Floats, qdd: Floats, jerk: Floats) -> Motion:
     """Of a plan, (moment, joint) each; torques are not known, and take no part."""
     still, none = STILL_SHARE * np.abs(qd).max(axis=0) + 1e-9, np.zeros(q.shape[1])
-    return Motion(time_s, q, qd, qdd, jerk, np.full_like(q, np.nan), still, None, BAND_HZ, none, none)
+    samples = Samples.as_planned(q, qd)
+    return Motion(time_s, q, qd, qdd, jerk, np.full_like(q, np.nan), still, None, BAND_HZ, none, none, samples)
 
 
 def moments_in(length_s: float) -> float:
@@ -126,7 +133,7 @@ def _on_clock_of(joints: StreamDevice, torque: StreamDevice) -> Track | None:
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """At every sample of a stretch without gap: (sample, joint) each."""
+    """At every sample of a stretch without gap but for its ends: (sample, joint) each."""
 
     time_s: Floats
     q_rad: Floats
@@ -135,6 +142,8 @@ class Run:
     jerk_rad_s3: Floats
     torque_nm: Floats
     noise_rad: Floats  # (joint,) of one reading of an angle
+    edge: int  # samples that are left out at each end
+    whole: tuple[Floats, Floats]  # angles and speeds, those of the ends, too
 
 
 def _runs(whole: Flags, band_hz: float, period_s: float) -> list[NDArray[np.intp]]:
@@ -156,14 +165,20 @@ def _filtered(time_s: Floats, q_rad: Floats, torque_nm: Floats, band_hz: float, 
     edge = round(EDGE_PERIODS / band_hz / period_s)
     inside = slice(edge, len(time_s) - edge)
     moved = smooth[inside], speed[inside], acceleration[inside], jerk[inside]
-    return Run(time_s[inside], *moved, torque[inside], noise)
+    return Run(time_s[inside], *moved, torque[inside], noise, edge, (smooth, speed))
 
 
 def _low_pass(values: Floats, band_hz: float, period_s: float) -> Floats:
-    from scipy.signal import butter, sosfiltfilt  # a diagnosis of poses starts sooner without
+    from scipy.signal import sosfiltfilt  # a diagnosis of poses starts sooner without
 
-    sections = butter(ORDER, 2.0 * band_hz * period_s, output="sos")
-    return np.asarray(sosfiltfilt(sections, values, axis=0), dtype=np.float64)
+    return np.asarray(sosfiltfilt(_sections(2.0 * band_hz * period_s), values, axis=0), dtype=np.float64)
+
+
+@lru_cache(maxsize=4)
+def _sections(share_of_nyquist: float) -> Floats:
+    from scipy.signal import butter
+
+    return np.asarray(butter(ORDER, share_of_nyquist, output="sos"))
 
 
 def _thinned(runs: list[Run], recording: Recording, band_hz: float, period_s: float) -> Motion | None:
@@ -172,24 +187,45 @@ def _thinned(runs: list[Run], recording: Recording, band_hz: float, period_s: fl
     fastest = np.max([np.abs(run.qd_rad_s).max(axis=0) for run in runs], axis=0)
     still = np.maximum(STILL_SHARE * fastest, STILL_SIGMAS * speed * noise) + 1e-9
     step = max(1, round(0.5 / band_hz / period_s), -(-sum(len(run.time_s) for run in runs) // MOST_ROWS))
-    parts = [_rows(run, still, round(TURN_PERIODS / band_hz / period_s), step) for run in runs]
+    parts = [_rows(run, still, 1.0 / band_hz / period_s, step) for run in runs]
     time_s, q, qd, qdd, jerk, torque = (np.concatenate(each) for each in zip(*parts, strict=True))
     if len(time_s) < FEWEST_ROWS or not np.isfinite(torque).any():
         return None
     heat = _temperatures(recording, time_s, q.shape[1])
-    return Motion(time_s, q, qd, qdd, jerk, torque, still, heat, band_hz, speed * noise, acceleration * noise)
+    samples = _samples(runs, step, lambda values: _low_pass(values, band_hz, period_s))
+    sigmas = speed * noise, acceleration * noise
+    return Motion(time_s, q, qd, qdd, jerk, torque, still, heat, band_hz, *sigmas, samples)
 
 
-def _rows(run: Run, still: Floats, window: int, step: int) -> tuple[Floats, ...]:
-    """Every `step`-th sample; torques of joints that stand or turn back within `window` samples are NaN."""
+def _samples(runs: list[Run], step: int, low_pass: Callable[[Floats], Floats]) -> Samples:
+    lengths = [len(run.whole[0]) for run in runs]
+    first = np.concatenate([[0], np.cumsum(lengths)[:-1]])
+    rows = [np.arange(at + run.edge, at + n - run.edge, step) for at, n, run in zip(first, lengths, runs, strict=True)]
+    q, qd = (np.concatenate(each) for each in zip(*(run.whole for run in runs), strict=True))
+    return Samples(q, qd, np.concatenate(rows), tuple(first[1:].tolist()), low_pass)
+
+
+def _rows(run: Run, still: Floats, period: float, step: int) -> tuple[Floats, ...]:
+    """Every `step`-th sample; torques of joints that stand or turn back about it are NaN. `period`: samples of the band."""
     sense = np.where(np.abs(run.qd_rad_s) < still, 0.0, np.sign(run.qd_rad_s))
-    steady = sense != 0.0
-    for shift in range(1, window + 1):
-        steady[shift:] &= sense[shift:] == sense[:-shift]
-        steady[:-shift] &= sense[:-shift] == sense[shift:]
+    near, far = round(TURN_PERIODS * period), round(STAND_PERIODS * period)
+    stands = _stands(sense == 0.0, far)
+    steady = ~_about(stands, far) & ~_about(sense == 0.0, near)
     torque = np.where(steady, run.torque_nm, np.nan)
     moved = run.q_rad, run.qd_rad_s, run.qdd_rad_s2, run.jerk_rad_s3
     return tuple(part[::step] for part in (run.time_s, *moved, torque))
+
+
+def _stands(slow: Flags, least: int) -> Flags:
+    """(sample, joint) where it is slow for more than `least` samples in a row: not only while it turns back."""
+    return _about(~_about(~slow, least // 2), least // 2)
+
+
+def _about(here: Flags, samples: int) -> Flags:
+    """(sample, joint) within so many samples of one that is true."""
+    from scipy.ndimage import binary_dilation  # as the low pass
+
+    return np.asarray(binary_dilation(here, np.ones((2 * samples + 1, 1), dtype=bool)))
 
 
 def _gains(band_hz: float, period_s: float) -> tuple[float, float]:

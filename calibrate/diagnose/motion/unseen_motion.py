@@ -113,4 +113,4 @@ def _part(motion: Motion, rows: slice) -> Motion:
     n = len(motion.time_s)
     each = ((field.name, getattr(motion, field.name)) for field in fields(motion))
     cut = {name: value[rows] for name, value in each if isinstance(value, np.ndarray) and len(value) == n}
-    return replace(motion, **cut)
+    return replace(motion, **cut, samples=replace(motion.samples, rows=motion.samples.rows[rows]))

@@ -11,8 +11,9 @@ from calibrate.model.effects.torque.motion_drivers import Floats, Law, MotionDri
 LIMIT_NM = 5e3
 MOST_DELAY_S = 0.05
 MOTOR_ORDERS = (1, 2)  # of the motor's turn: an eccentric gear wheel, the two lobes of a wave generator
-LEAST_ON_A_WAVE = 4.0  # moments on a wave: faster, and the rows do not show it
+LEAST_ON_A_WAVE = 4.0  # samples on a wave: faster, and they do not show it
 LEAST_TURN = 0.5  # of a joint's wave, that the motion must hold
+LEAST_PASSED = 0.05  # of its squares, that the low pass leaves
 
 
 def _constant(drivers: Drivers) -> tuple[Term, ...]:
@@ -58,9 +59,7 @@ def _ripple(drivers: Drivers) -> tuple[Term, ...]:
         ratio = drivers.rig.arm.joints[i - 1].gear_ratio
         waves = [] if ratio is None else [(order, order * abs(ratio), "motor") for order in MOTOR_ORDERS]
         for order, cycles, turn in waves:
-            angle = drivers.q_rad[:, i - 1] * cycles
-            step = float(np.median(np.abs(np.diff(angle)))) if len(angle) > 1 else np.inf
-            if float(np.ptp(angle)) < 2.0 * np.pi * LEAST_TURN or step > 2.0 * np.pi / LEAST_ON_A_WAVE:
+            if not _shows(drivers, i, cycles):
                 continue
             out.append(
                 at_torque(
@@ -80,10 +79,19 @@ def _ripple(drivers: Drivers) -> tuple[Term, ...]:
     return tuple(out)
 
 
+def _shows(drivers: MotionDrivers, i: int, cycles: float) -> bool:
+    """Whether samples and low pass leave enough of the waves."""
+    angle = drivers.samples.q_rad[:, i - 1] * cycles
+    step = float(np.median(np.abs(np.diff(angle)))) if len(angle) > 1 else np.inf
+    if float(np.ptp(angle)) < 2.0 * np.pi * LEAST_TURN or step > 2.0 * np.pi / LEAST_ON_A_WAVE:
+        return False
+    return float(np.mean(np.sum(_wave(i, cycles)(drivers, np.zeros(0)) ** 2, axis=1))) > LEAST_PASSED
+
+
 def _wave(i: int, cycles: float) -> Law:
     def law(d: MotionDrivers, inner: Floats) -> Floats:
-        angle = cycles * d.q_rad[:, i - 1]
-        return np.stack([np.sin(angle), np.cos(angle)], axis=1)
+        angle = cycles * d.samples.q_rad[:, i - 1]
+        return d.samples.passed(np.stack([np.sin(angle), np.cos(angle)], axis=1))
 
     return law
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from calibrate.model.effects.curve import UNKNOWN
 from calibrate.model.effects.drivers import Drivers
 from calibrate.model.effects.kind import Kind
 from calibrate.model.effects.term import Inner, Missing, Shape, Term
@@ -10,7 +11,9 @@ from calibrate.model.effects.torque.motion_drivers import Floats, Law, MotionDri
 LIMIT_NM = 5e3  # the drive of joint 1 of a robot for 300 kg: 300 Nm (Weigand et al., KR 300 R2500)
 LIMIT_NMS = 2e4  # Nm per rad/s, of the same
 STRIBECK_RAD_S = (0.01, 0.02, 0.05, 0.1, 0.2)
+LEAST_STRIBECK = 0.5  # of the speed below which a joint is taken to stand: what is slower no torque shows
 RUN_IN_S = (30.0, 100.0, 300.0, 1000.0)  # grease spreads in minutes: in less it is the motion that changes
+TURNS = (1, 2, 3)  # waves of uneven friction in a turn of the joint
 SPREAD_K = 2.0  # by which a joint must warm up before its friction can be said to follow
 
 
@@ -57,11 +60,14 @@ def _viscous(drivers: Drivers) -> tuple[Term, ...]:
 def _stribeck(drivers: Drivers) -> tuple[Term, ...]:
     def law(i: int) -> Law:
         def function(d: MotionDrivers, inner: Floats) -> Floats:
-            return (d.sense(i) * np.exp(-((d.qd[:, i - 1] / inner[0]) ** 2)))[:, None]
+            return d.sense_by_speed(i, lambda speed: np.exp(-((speed / inner[0]) ** 2)))[:, None]
 
         return function
 
-    grid = Inner("speed_rad_s", STRIBECK_RAD_S, STRIBECK_RAD_S[0] / 3.0, 3.0 * STRIBECK_RAD_S[-1])
+    if not isinstance(drivers, MotionDrivers):
+        return ()
+    slowest = {i: LEAST_STRIBECK * float(drivers.still_rad_s[i - 1]) for i in joints(drivers)}
+    grids = {i: tuple(one for one in STRIBECK_RAD_S if one > least) for i, least in slowest.items()}
     return tuple(
         at_torque(
             i,
@@ -73,10 +79,11 @@ def _stribeck(drivers: Drivers) -> tuple[Term, ...]:
             ("friction_nm",),
             LIMIT_NM,
             f"Joint {i} needs {{friction_nm}} more to turn slowly, below some {{speed_rad_s}}: stiction",
-            inner=(grid,),
+            inner=(Inner("speed_rad_s", grid, max(slowest[i], grid[0] / 3.0), 3.0 * grid[-1]),),
             positive=True,
         )
-        for i in joints(drivers)
+        for i, grid in grids.items()
+        if grid
     )
 
 
@@ -156,6 +163,35 @@ def _run_in(drivers: Drivers) -> tuple[Term, ...]:
             inner=(Inner("time_constant_s", grid, grid[0] / 3.0, 3.0 * grid[-1]),),
             positive=True,
             slow=True,
+        )
+        for i in joints(drivers)
+    )
+
+
+def uneven(drivers: Drivers) -> tuple[Term, ...]:
+    """Open: friction that follows the joint's turn, as no entry of the catalogue does."""
+
+    def law(i: int) -> Law:
+        def function(d: MotionDrivers, inner: Floats) -> Floats:
+            q = d.q_rad[:, i - 1]
+            waves = np.stack([np.ones(len(q)), *(wave(k * q) for k in TURNS for wave in (np.sin, np.cos))], axis=1)
+            return d.sense(i)[:, None] * waves
+
+        return function
+
+    return tuple(
+        at_torque(
+            i,
+            drivers.n_joints,
+            UNKNOWN,
+            Shape.PRODUCT,
+            (f"q{i}", f"qd{i}"),
+            law(i),
+            tuple(f"c{k}_nm" for k in range(1 + 2 * len(TURNS))),
+            LIMIT_NM,
+            f"Joint {i} has friction that changes as it turns",
+            variant="uneven friction",
+            open_=True,
         )
         for i in joints(drivers)
     )

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +12,31 @@ from calibrate.model.effects.ports import Place, Port
 from calibrate.model.effects.term import Form, Inner, Shape
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.intp]
 Law = Callable[["MotionDrivers", Floats], Floats]  # (moment, m) for inner values (inner,)
+
+
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """What was read between the moments: what changes within a moment is made of all samples, and passes the low pass
+    that their torques have passed.
+    """
+
+    q_rad: Floats  # (sample, joint)
+    qd_rad_s: Floats  # (sample, joint)
+    rows: Ints  # (moment,) sample of each
+    cuts: tuple[int, ...]  # first samples of all runs without gap but the first
+    low_pass: Callable[[Floats], Floats]  # of (sample, m)
+
+    @classmethod
+    def as_planned(cls, q_rad: Floats, qd_rad_s: Floats) -> "Samples":
+        """Moments of a plan, that pass no filter."""
+        return cls(q_rad, qd_rad_s, np.arange(len(q_rad)), (), lambda values: values)
+
+    def passed(self, values: Floats) -> Floats:
+        """(moment, m) of values (sample, m)."""
+        runs = np.split(values, self.cuts)
+        return np.concatenate([self.low_pass(run) for run in runs])[self.rows]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -27,6 +52,7 @@ class MotionDrivers(Drivers):
     lean_columns: Floats  # (moment * joint * 2, link number) its change for one radian that gravity leans about x, y
     last_link: Floats  # (moment, joint, 10) torque for one unit of each number of what the flange carries
     tilted: Floats  # (moment, joint, 2) torque for one radian by which gravity leans about x, y of the base
+    samples: Samples
     still_rad_s: Floats  # (joint,) below this speed it is open which way a joint turns
     middle_rad: Floats  # (joint,) what the way of a spring is counted from
     temperature_degC: Floats | None = None  # (moment, joint)
@@ -36,9 +62,20 @@ class MotionDrivers(Drivers):
     def clock_is_a_cause(self) -> bool:
         return False
 
+    @cached_property
+    def senses(self) -> Floats:
+        """(moment, joint) which way each joint turns, behind the low pass; nought while it stands."""
+        return self.samples.passed(np.clip(self.samples.qd_rad_s / self.still_rad_s, -1.0, 1.0))
+
     def sense(self, joint: int) -> Floats:
-        """(moment,) -1 to 1: which way a joint (from 1) turns; nought while it stands."""
-        return np.clip(self.qd[:, joint - 1] / self.still_rad_s[joint - 1], -1.0, 1.0)
+        """(moment,) of a joint, from 1."""
+        return self.senses[:, joint - 1]
+
+    def sense_by_speed(self, joint: int, law: Callable[[Floats], Floats]) -> Floats:
+        """(moment,) of a joint, from 1, times a law of its speed, behind the low pass."""
+        speed = self.samples.qd_rad_s[:, joint - 1 : joint]
+        sense = np.clip(speed / self.still_rad_s[joint - 1], -1.0, 1.0)
+        return self.samples.passed(sense * law(speed))[:, 0]
 
 
 def torque_port(joint: int) -> Port:
@@ -63,8 +100,12 @@ def at_torque(
     polar: bool = False,
     reversed_sentence: str = "",
     slow: bool = False,
+    variant: str = "",
+    open_: bool = False,
 ) -> Form:
-    """A term at the torque of one joint (from 1). `positive`: no machine has it with the other sign."""
+    """A term at the torque of one joint (from 1). `positive`: no machine has it with the other sign; `open_`: it
+    stands for what no entry of the catalogue describes.
+    """
     direction = np.zeros((n_joints, 1))
     direction[joint - 1] = 1.0
 
@@ -80,7 +121,9 @@ def at_torque(
         physics,
         order,
         inner,
-        slow,
+        slow=slow,
+        variant=variant,
+        open=open_,
         function=function,
         names=names,
         limit=limit,
