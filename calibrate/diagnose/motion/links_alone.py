@@ -167,7 +167,8 @@ def _drawn(effect: EffectRecord, waves: int, n: int) -> Accepted:
 
 def _is(effect: EffectRecord, term: Term) -> bool:
     physics = effect.listed or effect.physics
-    return (effect.where, physics, effect.order) == (term.port.where, term.physics, term.order)
+    of_term = term.port.where, term.physics, term.order, term.variant
+    return (effect.where, physics, effect.order, effect.variant) == of_term and effect.waves is None
 
 
 def _accepted(effect: EffectRecord, term: Term) -> Accepted:

@@ -206,7 +206,7 @@ def _samples(runs: list[Run], step: int, low_pass: Callable[[Floats], Floats]) -
 
 
 def _rows(run: Run, still: Floats, period: float, step: int) -> tuple[Floats, ...]:
-    """Every `step`-th sample; torques of joints that stand or turn back about it are NaN. `period`: samples of the band."""
+    """Every `step`-th sample; NaN: the joint stands or turns back about it. `period`: samples in one of the band."""
     sense = np.where(np.abs(run.qd_rad_s) < still, 0.0, np.sign(run.qd_rad_s))
     near, far = round(TURN_PERIODS * period), round(STAND_PERIODS * period)
     stands = _stands(sense == 0.0, far)
