@@ -10,8 +10,9 @@ from calibrate.model.effects.torque.motion_drivers import Floats, Law, MotionDri
 
 LIMIT_NM = 5e3  # the drive of joint 1 of a robot for 300 kg: 300 Nm (Weigand et al., KR 300 R2500)
 LIMIT_NMS = 2e4  # Nm per rad/s, of the same
-STRIBECK_RAD_S = (0.01, 0.02, 0.05, 0.1, 0.2)
-LEAST_STRIBECK = 0.5  # of the speed below which a joint is taken to stand: what is slower no torque shows
+# Speeds of stiction, times that below which a joint is taken to stand: what is slower no torque shows, what reaches a
+# fifth of the fastest motion is friction that bends with speed.
+STRIBECK_SPEEDS = (0.5, 0.7, 1.4, 2.8, 5.6, 10.0)
 RUN_IN_S = (30.0, 100.0, 300.0, 1000.0)  # grease spreads in minutes: in less it is the motion that changes
 TURNS = (1, 2, 3)  # waves of uneven friction in a turn of the joint
 SPREAD_K = 2.0  # by which a joint must warm up before its friction can be said to follow
@@ -66,8 +67,7 @@ def _stribeck(drivers: Drivers) -> tuple[Term, ...]:
 
     if not isinstance(drivers, MotionDrivers):
         return ()
-    slowest = {i: LEAST_STRIBECK * float(drivers.still_rad_s[i - 1]) for i in joints(drivers)}
-    grids = {i: tuple(one for one in STRIBECK_RAD_S if one > least) for i, least in slowest.items()}
+    still = drivers.still_rad_s.tolist()
     return tuple(
         at_torque(
             i,
@@ -79,12 +79,16 @@ def _stribeck(drivers: Drivers) -> tuple[Term, ...]:
             ("friction_nm",),
             LIMIT_NM,
             f"Joint {i} needs {{friction_nm}} more to turn slowly, below some {{speed_rad_s}}: stiction",
-            inner=(Inner("speed_rad_s", grid, max(slowest[i], grid[0] / 3.0), 3.0 * grid[-1]),),
+            inner=(_stribeck_speed(still[i - 1]),),
             positive=True,
         )
-        for i, grid in grids.items()
-        if grid
+        for i in joints(drivers)
     )
+
+
+def _stribeck_speed(still_rad_s: float) -> Inner:
+    least, *between, most = (share * still_rad_s for share in STRIBECK_SPEEDS)
+    return Inner("speed_rad_s", tuple(between), least, most)
 
 
 def _loaded(drivers: Drivers) -> tuple[Term, ...]:

@@ -13,6 +13,7 @@ from calibrate.model.effects.term import Form, Inner, Shape
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
+TURNING = 0.3  # of the speed below which a joint is taken to stand: from there on friction has all its size
 Law = Callable[["MotionDrivers", Floats], Floats]  # (moment, m) for inner values (inner,)
 
 
@@ -65,7 +66,12 @@ class MotionDrivers(Drivers):
     @cached_property
     def senses(self) -> Floats:
         """(moment, joint) which way each joint turns, behind the low pass; nought while it stands."""
-        return self.samples.passed(np.clip(self.samples.qd_rad_s / self.still_rad_s, -1.0, 1.0))
+        return self.samples.passed(self._senses)
+
+    @cached_property
+    def _senses(self) -> Floats:
+        """(sample, joint) before it."""
+        return np.clip(self.samples.qd_rad_s / (TURNING * self.still_rad_s), -1.0, 1.0)
 
     def sense(self, joint: int) -> Floats:
         """(moment,) of a joint, from 1."""
@@ -73,9 +79,8 @@ class MotionDrivers(Drivers):
 
     def sense_by_speed(self, joint: int, law: Callable[[Floats], Floats]) -> Floats:
         """(moment,) of a joint, from 1, times a law of its speed, behind the low pass."""
-        speed = self.samples.qd_rad_s[:, joint - 1 : joint]
-        sense = np.clip(speed / self.still_rad_s[joint - 1], -1.0, 1.0)
-        return self.samples.passed(sense * law(speed))[:, 0]
+        here = slice(joint - 1, joint)
+        return self.samples.passed(self._senses[:, here] * law(self.samples.qd_rad_s[:, here]))[:, 0]
 
 
 def torque_port(joint: int) -> Port:
