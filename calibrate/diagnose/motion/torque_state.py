@@ -29,6 +29,7 @@ FEWEST_NEIGHBOURS = 20  # data of a joint, for the memory of its noise
 NEAR = 1.5  # times the least gap: data that are neighbours
 MOST_ALONG = 0.99  # of the noise, from one datum to the next
 LEAST_MEMORY_S = 1e-3
+RATE_STEP_S = 1e-4  # of the difference quotient by time
 MOST_MEMORY_S = 0.1  # what lasts longer than vibration and ripple follows the motion: it is no noise
 
 
@@ -236,7 +237,15 @@ def with_torque(drivers: MotionDrivers, links: Floats, terms: Sequence[Accepted]
     for a in terms:
         if a.term.physics in LOADS:
             torque = torque + a.at(drivers)
-    rate = (drivers.rate_columns @ carried).reshape(-1, n)  # of links and payload: rows stand too far apart for a slope
+    rate = (drivers.rate_columns @ carried).reshape(-1, n)  # of links and payload
     extra = {**drivers.extra, **{f"tau{i + 1}": torque[:, i] for i in range(n)}}
     tilted = (drivers.lean_columns @ carried).reshape(-1, n, 2)
-    return replace(drivers, torque_nm=torque, torque_rate_nm_s=rate, tilted=tilted, extra=extra)
+    out = replace(drivers, torque_nm=torque, torque_rate_nm_s=rate, tilted=tilted, extra=extra)
+    beside = [a for a in terms if a.term.physics != PAYLOAD.physics]
+    return replace(out, torque_rate_nm_s=rate + _rate_of(beside, out)) if beside else out
+
+
+def _rate_of(terms: Sequence[Accepted], drivers: MotionDrivers) -> Floats:
+    """(moment, joint) derivative by time of what terms add: moments stand too far apart for a slope."""
+    ahead, back = (drivers.moved_on(h) for h in (RATE_STEP_S, -RATE_STEP_S))
+    return np.asarray(sum((a.at(ahead) - a.at(back) for a in terms), np.zeros_like(drivers.qd)) / (2.0 * RATE_STEP_S))

@@ -1,7 +1,7 @@
 """What a torque may depend on, one value a moment of a motion; and the form of a term at one joint's torque."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -72,6 +72,13 @@ class MotionDrivers(Drivers):
     def _senses(self) -> Floats:
         """(sample, joint) before it."""
         return np.clip(self.samples.qd_rad_s / (TURNING * self.still_rad_s), -1.0, 1.0)
+
+    def moved_on(self, by_s: float) -> "MotionDrivers":
+        """So much later: angles, speeds and torques at their rates, the sense of motion as it is."""
+        samples = replace(self.samples, q_rad=self.samples.q_rad + by_s * self.samples.qd_rad_s)
+        q_rad, qd = self.q_rad + by_s * self.qd, self.qd + by_s * self.qdd_rad_s2
+        torque_nm = self.torque_nm + by_s * self.torque_rate_nm_s
+        return replace(self, samples=samples, q_rad=q_rad, qd=qd, torque_nm=torque_nm)
 
     def sense(self, joint: int) -> Floats:
         """(moment,) of a joint, from 1."""
