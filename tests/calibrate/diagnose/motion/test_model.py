@@ -82,7 +82,7 @@ def test_mujoco_takes_the_same_torques_with_the_exported_arm(model: ModelFile, t
     data, seen = mujoco.MjData(arm), motion(recorded(NOW, seed=2))
     assert model.torques is not None
     expected = expected_nm(rig, seen, model.torques)
-    turning = 1.0 - np.abs(motion_drivers(rig, seen).senses) > 1e-3  # there friction has passed the low pass
+    turning = np.abs(np.abs(motion_drivers(rig, seen).senses) - 1.0) > 1e-3  # there friction has passed the low pass
     moved = np.isfinite(seen.torque_nm) & ~turning
     for k in range(0, len(expected), 10):
         data.qpos[:], data.qvel[:], data.qacc[:] = seen.q_rad[k], seen.qd_rad_s[k], seen.qdd_rad_s2[k]
