@@ -1,6 +1,6 @@
 """A UR5e in motion, by MuJoCo's inverse dynamics, with mechanisms that are put in by plain laws, for tests."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import msgspec
@@ -148,3 +148,12 @@ def recorded(hidden, seed=1, length_s=20.0, noise_nm=TORQUE_NOISE_NM):
     values = {"actual_q_rad": q, "joint_torque_nm": torque}
     stream = Stream("robot", channels, t, t, np.arange(len(t)), values)
     return Recording(Path("motion"), "", rig, Samples({"t_s": np.zeros(0)}, n), True, streams={"robot": stream})
+
+
+def with_more(recording, joint, law):
+    """With `law` of the angle and the speed of a joint (from 1) added to its torque; Nm, rad, rad/s."""
+    stream = recording.streams["robot"]
+    angle, torque = stream.values["actual_q_rad"][:, joint - 1], stream.values["joint_torque_nm"].copy()
+    torque[:, joint - 1] += law(angle, np.gradient(angle, 1.0 / RATE_HZ))
+    values = {**stream.values, "joint_torque_nm": torque}
+    return replace(recording, streams={"robot": replace(stream, values=values)})

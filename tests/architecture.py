@@ -203,7 +203,7 @@ def figures() -> tuple[Figure, ...]:
 
 TODAY = {
     "files": 817,
-    "code": 87_800,
+    "code": 87_900,
     "longest_function": 53,
     "one_importer": 2,
     "classes": 0,

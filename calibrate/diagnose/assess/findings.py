@@ -54,6 +54,7 @@ Floats = NDArray[np.float64]
 NO_SIZE = ("phase", "time", "period", "degree", "order")  # words of parameters for where or when, not how much
 WEIGHTS = ("gravity_torque", "overturning_moment", "payload")
 OF_ANGLES = re.compile(r"(q|gravity_torque)\d+")
+SPEED = re.compile(r"qd\d+")
 
 
 def named(term: Term) -> Named:
@@ -164,7 +165,7 @@ def _jumps(finding: Finding, unknown: Finding) -> bool:
 def _within(name: Named, unknown: Named) -> bool:
     """Whether an unknown cause may hold a name's drivers: weight is a function of the angles of the joints."""
     by_angles = name.where == unknown.where and all(OF_ANGLES.fullmatch(driver) for driver in unknown.depends_on)
-    return set(name.depends_on) <= set(unknown.depends_on) or (by_angles and _by_weight(name))
+    return _by_its_drivers(name, unknown) or (by_angles and _by_weight(name))
 
 
 def _misweighed(finding: Finding, load: Finding, weighed: bool) -> bool:
@@ -226,7 +227,15 @@ def _no_leftovers(names: Sequence[Finding], unknown: Sequence[Finding]) -> list[
 
 def _leftover(finding: Finding, unknown: Finding) -> bool:
     here = finding.name.where == unknown.name.where
-    return here and set(finding.name.depends_on) <= set(unknown.name.depends_on) and not _jumps(finding, unknown)
+    return here and _by_its_drivers(finding.name, unknown.name) and not _jumps(finding, unknown)
+
+
+def _by_its_drivers(name: Named, unknown: Named) -> bool:
+    """Whether it depends on nothing but what an unknown cause depends on; friction turns with the sense of motion, what
+    does not is no part of it.
+    """
+    speeds = {driver for driver in unknown.depends_on if SPEED.fullmatch(driver)}
+    return speeds <= set(name.depends_on) <= set(unknown.depends_on)
 
 
 def pieces(accepted: Sequence[Accepted], places: int) -> list[tuple[int, ...]]:

@@ -19,7 +19,7 @@ from calibrate.model.arms.serial import SerialArm
 from calibrate.model.effect_records import EffectRecord
 from calibrate.model.effects.curve import TORQUE, UNKNOWN, cause, features_within
 from calibrate.model.effects.term import Accepted, Shape, Term
-from calibrate.model.effects.torque import MotionDrivers, at_torque, torque_terms
+from calibrate.model.effects.torque import MotionDrivers, at_joints, torque_terms
 from calibrate.model.parameters import start_values
 from calibrate.model.rigid import cross_matrix
 from calibrate.model.torque_records import TorquesOfModel
@@ -150,18 +150,18 @@ def listed_torques(effects: Sequence[EffectRecord], drivers: MotionDrivers) -> t
     """
     terms = torque_terms(drivers)
     listed = [_accepted(one, term) for one in effects for term in terms if _is(one, term)]
-    return (*listed, *(_drawn(one, one.waves, drivers.n_joints) for one in effects if one.waves is not None))
+    return (*listed, *(_drawn(one, one.waves, drivers) for one in effects if one.waves is not None))
 
 
-def _drawn(effect: EffectRecord, waves: int, n: int) -> Accepted:
+def _drawn(effect: EffectRecord, waves: int, drivers: MotionDrivers) -> Accepted:
     """An unknown cause, over the range of its drivers; beyond it as at its end."""
     names = tuple(effect.depends_on.split(","))
 
-    def law(d: MotionDrivers, inner: Floats) -> Floats:
+    def law(d: MotionDrivers, inner: Floats, i: int) -> Floats:
         return features_within([cause(d, name) for name in names], [effect.range[name] for name in names], waves)
 
     joint, coefficients = int(effect.where.removeprefix("joint").removesuffix(TORQUE)), [*effect.coefficients.values()]
-    term = at_torque(joint, n, UNKNOWN, Shape.SMOOTH, names, law, (), np.inf, effect.says)
+    (term,) = at_joints(drivers, UNKNOWN, Shape.SMOOTH, names, law, (), np.inf, effect.says, among=(joint,))
     return Accepted(term, np.array(coefficients, dtype=float), np.zeros(0))
 
 

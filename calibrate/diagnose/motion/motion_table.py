@@ -225,7 +225,7 @@ def _about(here: Flags, samples: int) -> Flags:
     """(sample, joint) within so many samples of one that is true."""
     from scipy.ndimage import binary_dilation  # as the low pass
 
-    return np.asarray(binary_dilation(here, np.ones((2 * samples + 1, 1), dtype=bool)))
+    return binary_dilation(here, np.ones((2 * samples + 1, 1), dtype=bool)).astype(np.bool_)
 
 
 def _gains(band_hz: float, period_s: float) -> tuple[float, float]:

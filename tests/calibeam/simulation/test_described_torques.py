@@ -1,5 +1,6 @@
 """What a URDF or MJCF file states of torques: against MuJoCo's own inverse dynamics of the file."""
 
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -12,7 +13,7 @@ from scipy.spatial.transform import Rotation
 from acquisition.recording.rig import load_rig
 from calibeam.simulation.described_torques import described_torques
 from calibrate.diagnose.motion.links_alone import listed_torques, motion_drivers
-from calibrate.diagnose.motion.motion_table import Motion
+from calibrate.diagnose.motion.motion_table import planned_motion
 from calibrate.errors import DataError
 from calibrate.model.arms.catalogue import arm_of
 from calibrate.model.parameters import start_values
@@ -105,8 +106,8 @@ def moments_of(n, rng, accelerated=True):
     """A motion of moments that have nothing to do with each other; joints never stand."""
     q, qdd = rng.uniform(-2.0, 2.0, (50, n)), accelerated * rng.normal(0.0, 3.0, (50, n))
     qd = rng.uniform(0.3, 2.0, (50, n)) * rng.choice([-1.0, 1.0], (50, n))
-    none = np.zeros(n)
-    return Motion(np.arange(50.0), q, qd, qdd, 0.0 * q, 0.0 * q, none + 1e-9, None, 20.0, none, none)
+    planned = planned_motion(np.arange(50.0), q, qd, qdd, 0.0 * q)
+    return replace(planned, torque_nm=0.0 * q, still_rad_s=np.full(n, 1e-9))
 
 
 def expected(rig, motion, known):

@@ -1,6 +1,7 @@
 """Exciting motions: within every limit, better than drawn ones, with sigmas that a fit of drawn noise confirms."""
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,7 @@ from acquisition.recording.rig import load_rig, parse_rig
 from calibeam.motion.exciting_motion import check_motion, clear_motion
 from calibrate.diagnose.motion import planned_drivers
 from calibrate.diagnose.motion.links_alone import torque_state
-from calibrate.diagnose.motion.motion_table import Motion
+from calibrate.diagnose.motion.motion_table import planned_motion
 from calibrate.diagnose.motion.torque_state import with_noise
 from calibrate.diagnose.motion.torques import usual_friction
 from calibrate.errors import DataError
@@ -67,11 +68,10 @@ def test_sigmas_are_those_of_a_fit_to_drawn_noise(made) -> None:
     t_s = np.linspace(0.0, plan.total_s, 400, endpoint=False)
     q, qd, qdd, jerk = (plan.at(t_s, k) for k in range(4))
     still = 0.02 * np.abs(qd).max(axis=0)
-    none = np.zeros(6)
     links = planned_drivers(RIG, t_s, (q, qd, qdd, jerk)).torque_nm
     for _ in range(16):
         torque = np.where(np.abs(qd) < still, np.nan, links + NOISE_NM * rng.standard_normal(q.shape))
-        state = torque_state(RIG, Motion(t_s, q, qd, qdd, jerk, torque, still, None, 20.0, none, none))
+        state = torque_state(RIG, replace(planned_motion(t_s, q, qd, qdd, jerk), torque_nm=torque))
         problem = state.refitted(usual_friction(state)).problem
         problem, _ = with_noise(problem, solve(problem).theta)
         names = [p.name for p in problem.parameters]

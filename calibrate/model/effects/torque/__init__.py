@@ -4,7 +4,7 @@ from calibrate.model.effects.kind import Kind
 from calibrate.model.effects.term import Term
 from calibrate.model.effects.torque import drives, friction, masses_and_springs
 from calibrate.model.effects.torque.masses_and_springs import LOADS, PAYLOAD
-from calibrate.model.effects.torque.motion_drivers import MotionDrivers, Samples, at_torque, torque_port
+from calibrate.model.effects.torque.motion_drivers import MotionDrivers, Samples, at_joints, torque_port
 
 TORQUES: tuple[Kind, ...] = (
     friction.COULOMB,
@@ -29,4 +29,4 @@ def torque_terms(drivers: MotionDrivers) -> tuple[Term, ...]:
     return (*(term for kind in TORQUES for term in kind.terms(drivers)), *friction.uneven(drivers))
 
 
-__all__ = ["LOADS", "PAYLOAD", "TORQUES", "MotionDrivers", "Samples", "at_torque", "torque_port", "torque_terms"]
+__all__ = ["LOADS", "PAYLOAD", "TORQUES", "MotionDrivers", "Samples", "at_joints", "torque_port", "torque_terms"]

@@ -6,7 +6,7 @@ from calibrate.model.effects.drivers import Drivers
 from calibrate.model.effects.kind import Kind
 from calibrate.model.effects.moved import RECORDING
 from calibrate.model.effects.term import Shape, Term
-from calibrate.model.effects.torque.motion_drivers import Floats, Law, MotionDrivers, at_torque, joints
+from calibrate.model.effects.torque.motion_drivers import Floats, Law, MotionDrivers, at_joints, joints
 
 LIMIT_NM = 5e3
 MOST_DELAY_S = 0.05
@@ -17,66 +17,55 @@ LEAST_PASSED = 0.05  # of its squares, that the low pass leaves
 
 
 def _constant(drivers: Drivers) -> tuple[Term, ...]:
-    return tuple(
-        at_torque(
-            i,
-            drivers.n_joints,
-            "torque-constant",
-            Shape.LINEAR,
-            (f"tau{i}",),
-            lambda d, inner, i=i: d.torque_nm[:, i - 1 : i],
-            ("scale_share",),
-            1.0,
-            f"The torque of joint {i} reads {{scale_share}} more than its links take: torque constant, ratio or masses",
-            reversed_sentence=f"The torque of joint {i} reads {{scale_share}} less than its links take",
-        )
-        for i in joints(drivers)
+    return at_joints(
+        drivers,
+        "torque-constant",
+        Shape.LINEAR,
+        ("tau{joint}",),
+        lambda d, inner, i: d.torque_nm[:, i - 1 : i],
+        ("scale_share",),
+        1.0,
+        "The torque of joint {joint} reads {scale_share} more than its links take: torque constant, ratio or masses",
+        reversed_sentence="The torque of joint {joint} reads {scale_share} less than its links take",
     )
 
 
 def _offset(drivers: Drivers) -> tuple[Term, ...]:
-    return tuple(
-        at_torque(
-            i,
-            drivers.n_joints,
-            "torque-offset",
-            Shape.CONSTANT,
-            (RECORDING,),
-            lambda d, inner: np.ones((len(d.t_s), 1)),
-            ("offset_nm",),
-            LIMIT_NM,
-            f"The torque of joint {i} is off by {{offset_nm}}: offset of its current, or friction of unequal senses",
-        )
-        for i in joints(drivers)
+    return at_joints(
+        drivers,
+        "torque-offset",
+        Shape.CONSTANT,
+        (RECORDING,),
+        lambda d, inner, i: np.ones((len(d.t_s), 1)),
+        ("offset_nm",),
+        LIMIT_NM,
+        "The torque of joint {joint} is off by {offset_nm}: offset of its current, or friction of unequal senses",
     )
 
 
 def _ripple(drivers: Drivers) -> tuple[Term, ...]:
     if not isinstance(drivers, MotionDrivers):
         return ()
-    out: list[Term] = []
-    for i in joints(drivers):
-        ratio = drivers.rig.arm.joints[i - 1].gear_ratio
-        waves = [] if ratio is None else [(order, order * abs(ratio), "motor") for order in MOTOR_ORDERS]
-        for order, cycles, turn in waves:
-            if not _shows(drivers, i, cycles):
-                continue
-            out.append(
-                at_torque(
-                    i,
-                    drivers.n_joints,
-                    "gear-ripple",
-                    Shape.HARMONIC,
-                    (f"q{i}",),
-                    _wave(i, cycles),
-                    ("amplitude_nm", "phase_rad"),
-                    LIMIT_NM,
-                    f"The torque of joint {i} ripples by {{amplitude_nm}}, {order} times a turn of the {turn}: gear",
-                    order=order,
-                    polar=True,
-                )
-            )
-    return tuple(out)
+    ratios = {i: drivers.rig.arm.joints[i - 1].gear_ratio for i in joints(drivers)}
+    waves = [(i, order, order * abs(ratio)) for i, ratio in ratios.items() if ratio for order in MOTOR_ORDERS]
+    return tuple(
+        term
+        for i, order, cycles in waves
+        if _shows(drivers, i, cycles)
+        for term in at_joints(
+            drivers,
+            "gear-ripple",
+            Shape.HARMONIC,
+            ("q{joint}",),
+            _wave(cycles),
+            ("amplitude_nm", "phase_rad"),
+            LIMIT_NM,
+            f"The torque of joint {{joint}} ripples by {{amplitude_nm}}, {order} times a turn of the motor: gear",
+            among=(i,),
+            order=order,
+            polar=True,
+        )
+    )
 
 
 def _shows(drivers: MotionDrivers, i: int, cycles: float) -> bool:
@@ -85,11 +74,11 @@ def _shows(drivers: MotionDrivers, i: int, cycles: float) -> bool:
     step = float(np.median(np.abs(np.diff(angle)))) if len(angle) > 1 else np.inf
     if float(np.ptp(angle)) < 2.0 * np.pi * LEAST_TURN or step > 2.0 * np.pi / LEAST_ON_A_WAVE:
         return False
-    return float(np.mean(np.sum(_wave(i, cycles)(drivers, np.zeros(0)) ** 2, axis=1))) > LEAST_PASSED
+    return float(np.mean(np.sum(_wave(cycles)(drivers, np.zeros(0), i) ** 2, axis=1))) > LEAST_PASSED
 
 
-def _wave(i: int, cycles: float) -> Law:
-    def law(d: MotionDrivers, inner: Floats) -> Floats:
+def _wave(cycles: float) -> Law:
+    def law(d: MotionDrivers, inner: Floats, i: int) -> Floats:
         angle = cycles * d.samples.q_rad[:, i - 1]
         return d.samples.passed(np.stack([np.sin(angle), np.cos(angle)], axis=1))
 
@@ -97,20 +86,16 @@ def _wave(i: int, cycles: float) -> Law:
 
 
 def _delay(drivers: Drivers) -> tuple[Term, ...]:
-    return tuple(
-        at_torque(
-            i,
-            drivers.n_joints,
-            "torque-delay",
-            Shape.LINEAR,
-            (f"dtau{i}",),
-            lambda d, inner, i=i: -d.torque_rate_nm_s[:, i - 1 : i],
-            ("delay_s",),
-            MOST_DELAY_S,
-            f"The torque of joint {i} is stamped {{delay_s}} later than its motion",
-            reversed_sentence=f"The torque of joint {i} is stamped {{delay_s}} earlier than its motion",
-        )
-        for i in joints(drivers)
+    return at_joints(
+        drivers,
+        "torque-delay",
+        Shape.LINEAR,
+        ("dtau{joint}",),
+        lambda d, inner, i: -d.torque_rate_nm_s[:, i - 1 : i],
+        ("delay_s",),
+        MOST_DELAY_S,
+        "The torque of joint {joint} is stamped {delay_s} later than its motion",
+        reversed_sentence="The torque of joint {joint} is stamped {delay_s} earlier than its motion",
     )
 
 

@@ -6,7 +6,7 @@ from calibrate.model.effects.curve import UNKNOWN
 from calibrate.model.effects.drivers import Drivers
 from calibrate.model.effects.kind import Kind
 from calibrate.model.effects.term import Inner, Missing, Shape, Term
-from calibrate.model.effects.torque.motion_drivers import Floats, Law, MotionDrivers, at_torque, joints
+from calibrate.model.effects.torque.motion_drivers import Floats, MotionDrivers, at_joints, joints
 
 LIMIT_NM = 5e3  # the drive of joint 1 of a robot for 300 kg: 300 Nm (Weigand et al., KR 300 R2500)
 LIMIT_NMS = 2e4  # Nm per rad/s, of the same
@@ -19,122 +19,88 @@ SPREAD_K = 2.0  # by which a joint must warm up before its friction can be said 
 
 
 def _coulomb(drivers: Drivers) -> tuple[Term, ...]:
-    return tuple(
-        at_torque(
-            i,
-            drivers.n_joints,
-            "coulomb-friction",
-            Shape.SIGN,
-            (f"qd{i}",),
-            _sense(i),
-            ("friction_nm",),
-            LIMIT_NM,
-            f"Joint {i} needs {{friction_nm}} more to turn than its model, either way: dry friction",
-            reversed_sentence=f"Joint {i} needs {{friction_nm}} less to turn than its model, either way",
-        )
-        for i in joints(drivers)
+    return at_joints(
+        drivers,
+        "coulomb-friction",
+        Shape.SIGN,
+        ("qd{joint}",),
+        lambda d, inner, i: d.sense(i)[:, None],
+        ("friction_nm",),
+        LIMIT_NM,
+        "Joint {joint} needs {friction_nm} more to turn than its model, either way: dry friction",
+        reversed_sentence="Joint {joint} needs {friction_nm} less to turn than its model, either way",
     )
 
 
-def _sense(i: int) -> Law:
-    return lambda drivers, inner: drivers.sense(i)[:, None]
-
-
 def _viscous(drivers: Drivers) -> tuple[Term, ...]:
-    return tuple(
-        at_torque(
-            i,
-            drivers.n_joints,
-            "viscous-friction",
-            Shape.LINEAR,
-            (f"qd{i}",),
-            lambda d, inner, i=i: d.qd[:, i - 1 : i],
-            ("friction_nms_per_rad",),
-            LIMIT_NMS,
-            f"Joint {i} needs {{friction_nms_per_rad}} more to turn than its model: viscous friction, grease",
-            reversed_sentence=f"Joint {i} needs {{friction_nms_per_rad}} less to turn than its model",
-        )
-        for i in joints(drivers)
+    return at_joints(
+        drivers,
+        "viscous-friction",
+        Shape.LINEAR,
+        ("qd{joint}",),
+        lambda d, inner, i: d.qd[:, i - 1 : i],
+        ("friction_nms_per_rad",),
+        LIMIT_NMS,
+        "Joint {joint} needs {friction_nms_per_rad} more to turn than its model: viscous friction, grease",
+        reversed_sentence="Joint {joint} needs {friction_nms_per_rad} less to turn than its model",
     )
 
 
 def _stribeck(drivers: Drivers) -> tuple[Term, ...]:
-    def law(i: int) -> Law:
-        def function(d: MotionDrivers, inner: Floats) -> Floats:
-            return d.sense_by_speed(i, lambda speed: np.exp(-((speed / inner[0]) ** 2)))[:, None]
-
-        return function
-
     if not isinstance(drivers, MotionDrivers):
         return ()
-    still = drivers.still_rad_s.tolist()
-    return tuple(
-        at_torque(
-            i,
-            drivers.n_joints,
+
+    def law(d: MotionDrivers, inner: Floats, i: int) -> Floats:
+        return d.sense_by_speed(i, lambda speed: np.exp(-((speed / inner[0]) ** 2)))[:, None]
+
+    def at(i: int) -> tuple[Term, ...]:
+        least, *between, most = (share * float(drivers.still_rad_s[i - 1]) for share in STRIBECK_SPEEDS)
+        return at_joints(
+            drivers,
             "stribeck-friction",
             Shape.EXPONENTIAL,
-            (f"qd{i}",),
-            law(i),
+            ("qd{joint}",),
+            law,
             ("friction_nm",),
             LIMIT_NM,
-            f"Joint {i} needs {{friction_nm}} more to turn slowly, below some {{speed_rad_s}}: stiction",
-            inner=(_stribeck_speed(still[i - 1]),),
+            "Joint {joint} needs {friction_nm} more to turn slowly, below some {speed_rad_s}: stiction",
+            among=(i,),
+            inner=(Inner("speed_rad_s", tuple(between), least, most),),
             positive=True,
         )
-        for i in joints(drivers)
-    )
 
-
-def _stribeck_speed(still_rad_s: float) -> Inner:
-    least, *between, most = (share * still_rad_s for share in STRIBECK_SPEEDS)
-    return Inner("speed_rad_s", tuple(between), least, most)
+    return tuple(term for i in joints(drivers) for term in at(i))
 
 
 def _loaded(drivers: Drivers) -> tuple[Term, ...]:
-    def law(i: int) -> Law:
-        return lambda d, inner: (d.sense(i) * np.abs(d.torque_nm[:, i - 1]))[:, None]
-
-    return tuple(
-        at_torque(
-            i,
-            drivers.n_joints,
-            "load-friction",
-            Shape.PRODUCT,
-            (f"qd{i}", f"tau{i}"),
-            law(i),
-            ("friction_share",),
-            1.0,
-            f"Joint {i} needs {{friction_share}} of its load more to turn: friction that grows with load",
-            positive=True,
-        )
-        for i in joints(drivers)
+    return at_joints(
+        drivers,
+        "load-friction",
+        Shape.PRODUCT,
+        ("qd{joint}", "tau{joint}"),
+        lambda d, inner, i: (d.sense(i) * np.abs(d.torque_nm[:, i - 1]))[:, None],
+        ("friction_share",),
+        1.0,
+        "Joint {joint} needs {friction_share} of its load more to turn: friction that grows with load",
+        positive=True,
     )
 
 
 def _cold(drivers: Drivers) -> tuple[Term, ...]:
     if not isinstance(drivers, MotionDrivers) or drivers.temperature_degC is None:
         return ()
-    warmth = _warmth(drivers)
-
-    def law(i: int) -> Law:
-        return lambda d, inner: (d.sense(i) * _warmth(d)[:, i - 1])[:, None]
-
-    return tuple(
-        at_torque(
-            i,
-            drivers.n_joints,
-            "temperature-friction",
-            Shape.PRODUCT,
-            (f"qd{i}", f"temp_joint{i}"),
-            law(i),
-            ("friction_nm_per_k",),
-            LIMIT_NM / 20.0,
-            f"Joint {i} needs {{friction_nm_per_k}} more to turn as it warms up",
-            reversed_sentence=f"Joint {i} needs {{friction_nm_per_k}} more to turn the colder it is: bearing or grease",
-        )
-        for i in joints(drivers)
-        if float(np.ptp(warmth[:, i - 1])) > SPREAD_K
+    spread_k = np.ptp(_warmth(drivers), axis=0)
+    return at_joints(
+        drivers,
+        "temperature-friction",
+        Shape.PRODUCT,
+        ("qd{joint}", "temp_joint{joint}"),
+        lambda d, inner, i: (d.sense(i) * _warmth(d)[:, i - 1])[:, None],
+        ("friction_nm_per_k",),
+        LIMIT_NM / 20.0,
+        "Joint {joint} needs {friction_nm_per_k} more to turn as it warms up",
+        among=[i for i in joints(drivers) if spread_k[i - 1] > SPREAD_K],
+        reversed_sentence="Joint {joint} needs {friction_nm_per_k} more to turn the colder it is: bearing or grease",
     )
 
 
@@ -149,55 +115,40 @@ def _run_in(drivers: Drivers) -> tuple[Term, ...]:
     grid = tuple(one for one in RUN_IN_S if length_s > 2.0 * one)
     if not grid:
         return ()
-
-    def law(i: int) -> Law:
-        return lambda d, inner: (d.sense(i) * np.exp(-(d.t_s - d.t_s.min()) / inner[0]))[:, None]
-
-    return tuple(
-        at_torque(
-            i,
-            drivers.n_joints,
-            "running-in",
-            Shape.EXPONENTIAL,
-            (f"qd{i}", "t"),
-            law(i),
-            ("friction_nm",),
-            LIMIT_NM,
-            f"Joint {i} needs {{friction_nm}} more to turn at first, with a time constant of {{time_constant_s}}",
-            inner=(Inner("time_constant_s", grid, grid[0] / 3.0, 3.0 * grid[-1]),),
-            positive=True,
-            slow=True,
-        )
-        for i in joints(drivers)
+    return at_joints(
+        drivers,
+        "running-in",
+        Shape.EXPONENTIAL,
+        ("qd{joint}", "t"),
+        lambda d, inner, i: (d.sense(i) * np.exp(-(d.t_s - d.t_s.min()) / inner[0]))[:, None],
+        ("friction_nm",),
+        LIMIT_NM,
+        "Joint {joint} needs {friction_nm} more to turn at first, with a time constant of {time_constant_s}",
+        inner=(Inner("time_constant_s", grid, grid[0] / 3.0, 3.0 * grid[-1]),),
+        positive=True,
+        slow=True,
     )
 
 
 def uneven(drivers: Drivers) -> tuple[Term, ...]:
     """Open: friction that follows the joint's turn, as no entry of the catalogue does."""
 
-    def law(i: int) -> Law:
-        def function(d: MotionDrivers, inner: Floats) -> Floats:
-            q = d.q_rad[:, i - 1]
-            waves = np.stack([np.ones(len(q)), *(wave(k * q) for k in TURNS for wave in (np.sin, np.cos))], axis=1)
-            return d.sense(i)[:, None] * waves
+    def law(d: MotionDrivers, inner: Floats, i: int) -> Floats:
+        q = d.q_rad[:, i - 1]
+        waves = np.stack([np.ones(len(q)), *(wave(k * q) for k in TURNS for wave in (np.sin, np.cos))], axis=1)
+        return d.sense(i)[:, None] * waves
 
-        return function
-
-    return tuple(
-        at_torque(
-            i,
-            drivers.n_joints,
-            UNKNOWN,
-            Shape.PRODUCT,
-            (f"q{i}", f"qd{i}"),
-            law(i),
-            tuple(f"c{k}_nm" for k in range(1 + 2 * len(TURNS))),
-            LIMIT_NM,
-            f"Joint {i} has friction that changes as it turns",
-            variant="uneven friction",
-            open_=True,
-        )
-        for i in joints(drivers)
+    return at_joints(
+        drivers,
+        UNKNOWN,
+        Shape.PRODUCT,
+        ("q{joint}", "qd{joint}"),
+        law,
+        tuple(f"c{k}_nm" for k in range(1 + 2 * len(TURNS))),
+        LIMIT_NM,
+        "Joint {joint} has friction that changes as it turns",
+        variant="uneven friction",
+        open_=True,
     )
 
 

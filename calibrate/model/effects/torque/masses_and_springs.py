@@ -6,7 +6,7 @@ from calibrate.model.effects.drivers import Drivers
 from calibrate.model.effects.kind import Kind
 from calibrate.model.effects.ports import Place, Port
 from calibrate.model.effects.term import Form, Shape, Term
-from calibrate.model.effects.torque.motion_drivers import Floats, Law, MotionDrivers, at_torque, joints
+from calibrate.model.effects.torque.motion_drivers import MotionDrivers, at_joints, joints
 
 LIMIT_KG_M2 = 1e3  # of a rotor behind its gear: 0.012 kg m² times 270 squared is 875 kg m² (Weigand et al., KR 300)
 LIMIT_KG = 500.0
@@ -15,34 +15,27 @@ LIMIT_NM_PER_RAD = 5e3
 
 
 def _rotor(drivers: Drivers) -> tuple[Term, ...]:
-    return tuple(
-        at_torque(
-            i,
-            drivers.n_joints,
-            "rotor-inertia",
-            Shape.LINEAR,
-            (f"qdd{i}",),
-            lambda d, inner, i=i: d.qdd_rad_s2[:, i - 1 : i],
-            ("inertia_kg_m2",),
-            LIMIT_KG_M2,
-            f"Joint {i} is harder to accelerate than its links by {{inertia_kg_m2}}: rotor and gear",
-            reversed_sentence=f"Joint {i} is easier to accelerate than its model by {{inertia_kg_m2}}: rotor and gear",
-        )
-        for i in joints(drivers)
+    return at_joints(
+        drivers,
+        "rotor-inertia",
+        Shape.LINEAR,
+        ("qdd{joint}",),
+        lambda d, inner, i: d.qdd_rad_s2[:, i - 1 : i],
+        ("inertia_kg_m2",),
+        LIMIT_KG_M2,
+        "Joint {joint} is harder to accelerate than its links by {inertia_kg_m2}: rotor and gear",
+        reversed_sentence="Joint {joint} is easier to accelerate than its model by {inertia_kg_m2}: rotor and gear",
     )
 
 
 def _payload(drivers: Drivers) -> tuple[Term, ...]:
-    def function(d: Drivers, inner: Floats) -> Floats:
-        return _motion(d).last_link
-
     return (
         Form(
             Port("tool.load", Place.JOINTS),
             (",".join(f"q{i}" for i in joints(drivers)),),
             Shape.LINEAR,
             "payload",
-            function=function,
+            function=lambda d, inner: _motion(d).last_link,
             names=(
                 *("mass_kg", "moment_x_kg_m", "moment_y_kg_m", "moment_z_kg_m"),
                 *(f"tensor_{axes}_kg_m2" for axes in ("xx", "yy", "zz", "xy", "xz", "yz")),
@@ -55,16 +48,13 @@ def _payload(drivers: Drivers) -> tuple[Term, ...]:
 
 
 def _gravity(drivers: Drivers) -> tuple[Term, ...]:
-    def function(d: Drivers, inner: Floats) -> Floats:
-        return _motion(d).tilted
-
     return (
         Form(
             Port("base.lean", Place.JOINTS),
             (",".join(f"q{i}" for i in joints(drivers)),),
             Shape.LINEAR,
             "gravity-direction",
-            function=function,
+            function=lambda d, inner: _motion(d).tilted,
             names=("lean_x_rad", "lean_y_rad"),
             limit=LIMIT_RAD,
             sentence="Gravity leans by {lean_x_rad} about x and {lean_y_rad} about y of the base: the arm does not "
@@ -74,24 +64,17 @@ def _gravity(drivers: Drivers) -> tuple[Term, ...]:
 
 
 def _spring(drivers: Drivers) -> tuple[Term, ...]:
-    def law(i: int) -> Law:
-        return lambda d, inner: np.stack([d.q_rad[:, i - 1] - d.middle_rad[i - 1], np.ones(len(d.t_s))], axis=1)
-
-    return tuple(
-        at_torque(
-            i,
-            drivers.n_joints,
-            "joint-spring",
-            Shape.LINEAR,
-            (f"q{i}",),
-            law(i),
-            ("stiffness_nm_per_rad", "level_nm"),
-            LIMIT_NM_PER_RAD,
-            f"Joint {i} is pulled back by {{stiffness_nm_per_rad}}, {{level_nm}} in the middle of its motion: spring, "
-            "hose or cables",
-            reversed_sentence=f"Joint {i} is pushed on by {{stiffness_nm_per_rad}}: a spring that balances",
-        )
-        for i in joints(drivers)
+    return at_joints(
+        drivers,
+        "joint-spring",
+        Shape.LINEAR,
+        ("q{joint}",),
+        lambda d, inner, i: np.stack([d.q_rad[:, i - 1] - d.middle_rad[i - 1], np.ones(len(d.t_s))], axis=1),
+        ("stiffness_nm_per_rad", "level_nm"),
+        LIMIT_NM_PER_RAD,
+        "Joint {joint} is pulled back by {stiffness_nm_per_rad}, {level_nm} in the middle of its motion: spring, hose "
+        "or cables",
+        reversed_sentence="Joint {joint} is pushed on by {stiffness_nm_per_rad}: a spring that balances",
     )
 
 

@@ -1,6 +1,6 @@
 """What a torque may depend on, one value a moment of a motion; and the form of a term at one joint's torque."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -9,12 +9,12 @@ from numpy.typing import NDArray
 
 from calibrate.model.effects.drivers import Drivers
 from calibrate.model.effects.ports import Place, Port
-from calibrate.model.effects.term import Form, Inner, Shape
+from calibrate.model.effects.term import Form, Functions, Inner, Shape
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
 TURNING = 0.3  # of the speed below which a joint is taken to stand: from there on friction has all its size
-Law = Callable[["MotionDrivers", Floats], Floats]  # (moment, m) for inner values (inner,)
+Law = Callable[["MotionDrivers", Floats, int], Floats]  # (moment, m) for inner values (inner,), at a joint from 1
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,9 +95,8 @@ def torque_port(joint: int) -> Port:
     return Port(f"joint{joint}.torque", Place.JOINTS)
 
 
-def at_torque(
-    joint: int,
-    n_joints: int,
+def at_joints(
+    drivers: Drivers,
     physics: str,
     shape: Shape,
     depends_on: tuple[str, ...],
@@ -106,6 +105,7 @@ def at_torque(
     limit: float,
     sentence: str,
     *,
+    among: Sequence[int] | None = None,
     inner: tuple[Inner, ...] = (),
     order: int | None = None,
     positive: bool = False,
@@ -114,37 +114,42 @@ def at_torque(
     slow: bool = False,
     variant: str = "",
     open_: bool = False,
-) -> Form:
-    """A term at the torque of one joint (from 1). `positive`: no machine has it with the other sign; `open_`: it
-    stands for what no entry of the catalogue describes.
-    """
-    direction = np.zeros((n_joints, 1))
-    direction[joint - 1] = 1.0
+) -> tuple[Form, ...]:
+    """A term at the torque of every joint, or of those `among` them, from 1; {joint} stands for its number.
 
+    `positive`: no machine has it with the other sign; `open_`: it stands for what no entry of the catalogue describes.
+    """
+    return tuple(
+        Form(
+            torque_port(i),
+            tuple(name.replace("{joint}", str(i)) for name in depends_on),
+            shape,
+            physics,
+            order,
+            inner,
+            slow=slow,
+            variant=variant,
+            open=open_,
+            function=_of_motion(law, i),
+            names=names,
+            limit=limit,
+            sentence=sentence.replace("{joint}", str(i)),
+            reversed_sentence=reversed_sentence.replace("{joint}", str(i)),
+            directions=np.eye(drivers.n_joints)[:, i - 1 : i],
+            polar=polar,
+            believable=(lambda values, inner: bool(values[0] > 0.0)) if positive else None,
+        )
+        for i in (joints(drivers) if among is None else among)
+    )
+
+
+def _of_motion(law: Law, joint: int) -> Functions:
     def function(drivers: Drivers, inner: Floats) -> Floats:
         if not isinstance(drivers, MotionDrivers):
             raise TypeError("a torque without a motion")
-        return law(drivers, inner)
+        return law(drivers, inner, joint)
 
-    return Form(
-        torque_port(joint),
-        depends_on,
-        shape,
-        physics,
-        order,
-        inner,
-        slow=slow,
-        variant=variant,
-        open=open_,
-        function=function,
-        names=names,
-        limit=limit,
-        sentence=sentence,
-        reversed_sentence=reversed_sentence,
-        directions=direction,
-        polar=polar,
-        believable=(lambda values, inner: bool(values[0] > 0.0)) if positive else None,
-    )
+    return function
 
 
 def joints(drivers: Drivers) -> range:

@@ -2,7 +2,6 @@
 MuJoCo.
 """
 
-from dataclasses import replace
 from pathlib import Path
 
 import mujoco
@@ -10,7 +9,7 @@ import numpy as np
 import pytest
 
 from acquisition.recording import Recording
-from benchmarks.drawn_motion import Hidden, recorded
+from benchmarks.drawn_motion import Hidden, recorded, with_more
 from calibrate.apply.export import export_model, form_named
 from calibrate.diagnose.motion import diagnose_torques, expected_nm, model_of_motion, torques_of_model
 from calibrate.diagnose.motion.links_alone import motion_drivers
@@ -104,9 +103,14 @@ def test_bodies_are_found_that_take_the_torques_of_links_that_no_body_has() -> N
     assert seen @ bodies == pytest.approx(seen @ links, abs=0.1)
 
 
+def wave(q: np.ndarray, qd: np.ndarray) -> np.ndarray:
+    """No order of the motor."""
+    return WAVE_NM * np.sin(5.0 * q)
+
+
 def test_a_cause_without_a_name_is_expected_again(tmp_path: Path) -> None:
     """A wave of the joint's own angle that is no order of the motor, found at one motion and expected at another."""
-    first, second = (with_wave(recorded(Hidden(), seed=seed)) for seed in (1, 2))
+    first, second = (with_more(recorded(Hidden(), seed=seed), 2, wave) for seed in (1, 2))
     found = diagnose_torques(first, np.random.default_rng(1))
     assert found is not None
     (effect,) = torques_of_model(found, "wave").effects
@@ -116,12 +120,3 @@ def test_a_cause_without_a_name_is_expected_again(tmp_path: Path) -> None:
     q2 = motion(first).q_rad[:, 1]
     inside = (seen.q_rad[:, 1] > q2.min()) & (seen.q_rad[:, 1] < q2.max())
     assert np.sqrt(np.nanmean(misfit[inside, 1] ** 2)) < 0.15 * WAVE_NM
-
-
-def with_wave(recording: Recording) -> Recording:
-    """With a torque at joint 2 that rises and falls with its angle."""
-    stream = recording.streams["robot"]
-    torque = stream.values["joint_torque_nm"].copy()
-    torque[:, 1] += WAVE_NM * np.sin(5.0 * stream.values["actual_q_rad"][:, 1])
-    values = {**stream.values, "joint_torque_nm": torque}
-    return replace(recording, streams={"robot": replace(stream, values=values)})

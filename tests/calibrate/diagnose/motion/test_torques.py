@@ -7,7 +7,7 @@ import pytest
 from msgspec import structs
 
 from acquisition.recording.rig.schema import Follows
-from benchmarks.drawn_motion import Hidden, recorded
+from benchmarks.drawn_motion import Hidden, recorded, with_more
 from calibrate.diagnose.assess.diagnosis import Verdict
 from calibrate.diagnose.motion import diagnose_torques
 from calibrate.diagnose.motion.links_alone import torque_state
@@ -45,6 +45,33 @@ def test_a_mechanism_is_named_at_its_joint_with_its_size(name):
         size = findings[0].parameters[parameter]
         assert abs(size.value - true) < OF_ITS_SIZE * true
         assert abs(size.value - true) < 4.0 * size.sigma
+
+
+def found_beside(hidden, joint, law):
+    found = diagnose_torques(with_more(recorded(hidden), joint, law), np.random.default_rng(1))
+    assert found is not None
+    return {(f.name.physics, f.name.where): f for f in found.diagnosis.findings if f.share > 0.01}
+
+
+def test_stiction_is_named_although_a_joint_is_slow_only_about_its_turns():
+    found = found_beside(Hidden(), 3, lambda q, qd: 2.0 * np.exp(-((qd / 0.06) ** 2)) * np.sign(qd))
+    (stiction,) = found.values()
+    assert set(found) == {("stribeck-friction", "joint3.torque")}
+    assert stiction.parameters["speed_rad_s"].value == pytest.approx(0.06, rel=0.05)
+    assert stiction.parameters["friction_nm"].value == pytest.approx(2.0, rel=0.05)
+
+
+def test_ripple_is_named_although_most_of_it_is_faster_than_the_low_pass():
+    found = found_beside(Hidden(), 4, lambda q, qd: 1.5 * np.sin(2.0 * 101.0 * q))
+    assert set(found) == {("gear-ripple", "joint4.torque")}
+    ripple = found["gear-ripple", "joint4.torque"]
+    assert (ripple.name.order, ripple.parameters["amplitude_nm"].value) == (2, pytest.approx(1.5, rel=OF_ITS_SIZE))
+
+
+def test_friction_that_changes_as_the_joint_turns_is_unknown_and_takes_no_spring_along():
+    uneven = found_beside(Hidden(spring={4: 3.0}), 4, lambda q, qd: (1.5 + np.sin(2.0 * q)) * np.sign(qd))
+    assert set(uneven) == {("unknown", "joint4.torque"), ("joint-spring", "joint4.torque")}
+    assert uneven["unknown", "joint4.torque"].name.depends_on == ("q4", "qd4")
 
 
 @pytest.mark.endure
