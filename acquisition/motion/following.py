@@ -186,7 +186,11 @@ class Following:
         now_s = self._clock.now_s()
         self._checked.check(q_rad, now_s)
         if self.followed.sent % PASSED_EVERY == 0:
-            self.followed.passed.append((now_s, self._points.on_path(self._cycle * self._period_s).t_s))
+            passed_s, known = self._points.on_path(self._cycle * self._period_s).t_s, self.followed.passed
+            if len(known) < 2 or passed_s > known[-2][1]:  # of a hold its begin and its end are enough
+                known.append((now_s, passed_s))
+            else:
+                known[-1] = now_s, passed_s
         self._arm.servo_joints(q_rad, self._period_s, self._stream.lookahead_s, self._stream.gain)
         self._speed_rad_s, self._q_rad = (q_rad - self._q_rad) / self._period_s, q_rad
         self._cycle += 1

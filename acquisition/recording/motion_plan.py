@@ -77,6 +77,13 @@ def write_motion_plan(path: Path, plan: MotionPlan) -> None:
     write_output(path, "\n".join(_lines(plan)) + "\n", MOTION_PLAN)
 
 
+def no_torque(rig: Rig) -> str:
+    """Why the currents of this rig's robot are no torques; empty where they are."""
+    if any(joint.torque_per_ampere for joint in rig.arm.joints):
+        return ""
+    return "no joint has a torque_per_ampere in the rig file: currents are recorded, and no torques can be made of them"
+
+
 def _contradictions(plan: MotionPlan, rig: Rig) -> Iterator[tuple[KeyPath, str]]:
     if plan.rig != rig.name:
         yield (

@@ -9,6 +9,7 @@ import msgspec
 import numpy as np
 
 from acquisition.recording import Recording
+from acquisition.recording.motion_plan import no_torque
 from acquisition.recording.pose_plan import write_pose_plan
 from acquisition.recording.rig import Rig, rig_sha256
 from calibeam.results.controller_findings import controller_notes
@@ -34,6 +35,7 @@ from calibrate.diagnose.record.schema import (
 from calibrate.diagnose.record.to_file import file_of
 from calibrate.diagnose.stages import Stage, Stages
 from calibrate.diagnose.streams import streams_of, with_streams
+from calibrate.diagnose.streams.recorded import CURRENT
 from calibrate.diagnose.with_model import known_before, model_of_diagnosis, only_new, with_known_model
 from calibrate.errors import DataError
 from calibrate.model.model_file import ModelFile, read_model
@@ -98,6 +100,8 @@ def diagnose_streams(
     file = with_torques(with_streams(nothing, report), torques)
     if file.torques is not None:
         file = msgspec.structs.replace(file, next=tuple(one for one in file.next if one not in nothing.next))
+    elif no_torque(recording.rig) and any(CURRENT in stream.values for stream in recording.streams.values()):
+        file = msgspec.structs.replace(file, next=(*file.next, no_torque(recording.rig)))
     agree = file.verdict == Verdict.CONSISTENT.value
     return torques, msgspec.structs.replace(file, verdict=Verdict.UNDECIDABLE.value) if agree else file
 

@@ -26,8 +26,8 @@ MARGIN_RAD = 0.1  # to either end of a joint's range
 OFF_HOME_RAD = 0.6  # by which a joint's middle is moved from home at most
 MOST_RAD = 1.6  # from its middle: a quarter turn to either side
 ACCELERATION_SHARE = 0.9
-STEP_S = 0.05  # between moments at which limits are checked
-BETWEEN = 0.99  # of a limit: between these moments a wave of 0.5 Hz may rise by 0.3 %
+STEP_S, STEPS_A_WAVE = 0.05, 40  # between moments at which limits are checked, at most
+BETWEEN = 0.99  # of a limit: between these moments a wave may rise by 0.3 %
 DRAWN, STEPS = 30, 150
 DIGITS = 7  # of an angle in rad: what they leave of speed and acceleration at rest is far below any drive's
 SHRINKS, SHRUNK = 12, 0.85  # of a motion that is not clear, times
@@ -81,7 +81,8 @@ class _Maker:
         self.rig, self.wish, self._clear = rig, wish, clear
         self.k = np.arange(1, waves + 1)
         self._sines, self._cosines = _null_space(self.k), _null_space(self.k**2)
-        self.t_s = np.arange(0.0, wish.length_s + STEP_S, STEP_S)
+        self.step_s = min(STEP_S, wish.length_s / waves / STEPS_A_WAVE)
+        self.t_s = np.arange(0.0, wish.length_s + self.step_s, self.step_s)
         joints = rig.arm.joints
         self.lower = np.array([j.lower_rad for j in joints]) + MARGIN_RAD
         self.upper = np.array([j.upper_rad for j in joints]) - MARGIN_RAD
@@ -112,7 +113,7 @@ class _Maker:
             return None
         for _ in range(SHRINKS):
             made = self._plan(shape, scale)
-            if self._clear(made.at(self.t_s), STEP_S):
+            if self._clear(made.at(self.t_s), self.step_s):
                 return made
             scale = SHRUNK * scale
         return None

@@ -27,7 +27,7 @@ def test_a_small_motion_about_home_is_clear_and_driven_as_it_is() -> None:
 
 
 def test_a_motion_that_is_too_fast_is_refused_not_stretched() -> None:
-    with pytest.raises(RefusedMotionError, match=r"7\.\d+ times too fast for the \[motion\] of the rig file; design"):
+    with pytest.raises(RefusedMotionError, match=r"has 7\.\d+ times the acceleration"):
         check_motion(RIG, motion(0.05, length_s=0.4))
 
 
@@ -55,3 +55,20 @@ def test_a_slow_area_counts() -> None:
     )
     slow = msgspec.structs.replace(free, motion=msgspec.structs.replace(free.motion, slow_area=(everywhere,)))
     assert not clear_motion(slow)(fast, 0.05)
+
+
+def test_a_wave_between_the_samples_of_a_plan_is_refused() -> None:
+    """25 Hz: differences of samples 20 ms apart see nothing of it."""
+    cosine = np.zeros(50)
+    cosine[[24, 25]] = -0.00217, 0.002006361  # sum of k squared times the k-th amplitude: 0
+    series = tuple(JointSeries(q, (0.0,) * 50, tuple(cosine.tolist())) for q in HOME_RAD.tolist())
+    with pytest.raises(RefusedMotionError, match=r"times the \w+ that \[motion\]"):
+        check_motion(RIG, MotionPlan(1, RIG.name, 1.0, 1, series))
+
+
+def test_a_motion_that_brings_the_wrist_to_the_upper_arm_is_refused_at_the_robot_too() -> None:
+    free = msgspec.structs.replace(RIG, motion=msgspec.structs.replace(RIG.motion, keep_out=(), slow_area=()))
+    folded = (0.3, -1.4, 2.7, -0.5, 0.5, 0.0)
+    series = tuple(JointSeries(q, (0.0, 0.0), (0.05, -0.0125)) for q in folded)
+    with pytest.raises(RefusedMotionError, match="'exciting motion' is not clear"):
+        check_motion(free, MotionPlan(1, RIG.name, 10.0, 1, series))
