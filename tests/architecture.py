@@ -203,7 +203,7 @@ def figures() -> tuple[Figure, ...]:
 
 TODAY = {
     "files": 817,
-    "code": 87_900,
+    "code": 88_000,
     "longest_function": 53,
     "one_importer": 2,
     "classes": 0,

@@ -64,6 +64,11 @@ def reconcile_command(
     if out.exists() and (not out.is_dir() or any(out.iterdir())):
         raise DataError(f"{out}: not an empty folder; give another --out")
     source = read(measured)
+    if len(source.samples) and simulation.suffix in DESCRIPTIONS:
+        raise DataError(
+            f"{simulation}: a recording with samples is compared with a rig file or a recording; make the rig file of "
+            f"this description: calibeam rig new --help"
+        )
     with naming_source(measured):
         part = reconcile_torques(source, torques_stated(simulation, source.rig), simulation.name)
         found = _of_poses(source, simulation, seed) if len(source.samples) else None
@@ -81,11 +86,6 @@ def reconcile_command(
 
 
 def _of_poses(source: Recording, simulation: Path, seed: int) -> Reconciled:
-    if simulation.suffix in DESCRIPTIONS:
-        raise DataError(
-            f"{simulation}: a recording with samples is compared with a rig file or a recording; make the rig file of "
-            f"this description: calibeam rig new --help"
-        )
     other: Recording | str = rig_text(simulation) if simulation.suffix == ".toml" else read(simulation)
     return reconcile(source, other, simulation.name, seed=seed)
 

@@ -100,8 +100,8 @@ def _check_rates(rig: Rig, motion: MotionPlan) -> None:
     share, joint, what = max((float(each[j]), j + 1, what) for each, what in shares for j in range(len(each)))
     if share > 1.0:
         raise RefusedMotionError(
-            f"joint {joint} of the motion has {share:.2f} times the {what} that [motion] of the rig file allows; design "
-            "it again with calibeam excite"
+            f"joint {joint} of the motion has {share:.2f} times the {what} that [motion] of the rig file allows; "
+            "design it again with calibeam excite"
         )
 
 

@@ -35,12 +35,12 @@ from calibrate.diagnose.record.schema import (
 from calibrate.diagnose.record.to_file import file_of
 from calibrate.diagnose.stages import Stage, Stages
 from calibrate.diagnose.streams import streams_of, with_streams
-from calibrate.diagnose.streams.recorded import CURRENT
 from calibrate.diagnose.with_model import known_before, model_of_diagnosis, only_new, with_known_model
 from calibrate.errors import DataError
 from calibrate.model.model_file import ModelFile, read_model
 from calibrate.model.sensors.catalogue import unused_columns
 
+CURRENT = "actual_current_a"  # channel of a controller that reports no torques
 SEED = 1  # of nulls, splits and bootstraps: the same recording always gives the same diagnosis
 
 

@@ -24,10 +24,14 @@ from calibrate.diagnose.motion import (
     with_torques,
 )
 from calibrate.diagnose.record.schema import DiagnosisFile
+from calibrate.errors import DataError
+from calibrate.model.arms.catalogue import arm_of
+from calibrate.model.parameters import start_values
 from calibrate.model.torque_records import TorquesOfModel
 from calibrate.quantities import counted, significant
 
 DESCRIPTIONS = (".xml", ".mjcf", ".urdf")
+OTHER_ARM = 0.02  # m, and of the axes of the flange: calibration moves them by less
 NO_TORQUES = "no torques beside joint angles in motion; record both, in one stream or two, for 20 s and more"
 NOT_BETTER = "no model: on the unseen part of the motion it is no better than the simulation, or than its links alone"
 
@@ -89,8 +93,21 @@ def reconcile_torques(measured: Recording, simulated: TorquesOfModel | None, nam
 def torques_stated(simulation: Path, rig: Rig) -> TorquesOfModel | None:
     """What a simulation states of the torques; None where it states no masses, or is a recording."""
     if simulation.suffix == ".toml":
-        return torques_of_rig(load_rig(simulation), simulation.name)
+        other = load_rig(simulation)
+        _refuse_other_arm(simulation, rig, other)
+        return torques_of_rig(other, simulation.name)
     return described_torques(simulation, rig) if simulation.suffix in DESCRIPTIONS else None
+
+
+def _refuse_other_arm(simulation: Path, rig: Rig, other: Rig) -> None:
+    """DataError where the flanges of the two arms are further apart than calibration moves them."""
+    same = other.n_joints == rig.n_joints
+    if same:
+        q_rad = np.outer((0.0, 0.5), np.ones(rig.n_joints))
+        mine, theirs = (arm.frames(start_values(arm.parameters), q_rad)[:, -1] for arm in map(arm_of, (rig, other)))
+        same = float(np.max(np.abs(mine - theirs))) < OTHER_ARM
+    if not same:
+        raise DataError(f"{simulation}: another arm than that of the recording; give the rig file of this robot")
 
 
 def _replayed(measured: Recording, found: MotionReconciled) -> tuple[tuple[JointTorquesRecord, ...], str]:

@@ -63,7 +63,7 @@ def tracked(recording: Recording, arms: Sequence[TorquesOfModel], cut_s: float) 
     followed = _followed(recording)
     if followed is None:
         return None, "no replay: set-points and torques of all joints in one stretch are needed"
-    cut = int(np.searchsorted(followed.time_s, cut_s))
+    cut = min(int(np.searchsorted(followed.time_s, cut_s)), len(followed.time_s) - 1)
     if followed.time_s[cut] - followed.time_s[0] < LEAST_S or followed.time_s[-1] - followed.time_s[cut] < LEAST_S:
         return None, f"no replay: less than {LEAST_S:g} s to learn the servo from, or to replay"
     models = [_in_mujoco(recording, arm) for arm in arms]

@@ -140,14 +140,14 @@ def _joints(found: TorqueDiagnosis) -> tuple[ComparedJoint, ...]:
     whole, model = found.bare.whole, found.model
     apart = -whole.misfit_nm(start_values(whole.parameters))  # before any number of a link is fitted
     left = model.problem.misfit_nm(model.theta)
-    out: list[ComparedJoint] = []
+    out, noise = list[ComparedJoint](), model.noise_nm
     for j in range(found.motion.torque_nm.shape[1]):
         rows, after = whole.joint == j, left[model.problem.joint == j]
         if not np.any(rows):
             continue
         measured = whole.observed_nm[rows]
         sizes = (_rms(each) for each in (measured, measured - apart[rows], apart[rows], after))
-        out.append(ComparedJoint(j + 1, int(np.sum(rows)), *sizes, noise_nm=float(model.problem.sigma_nm[j])))
+        out.append(ComparedJoint(j + 1, int(np.sum(rows)), *sizes, noise_nm=float(noise[j])))
     return tuple(out)
 
 

@@ -16,6 +16,7 @@ from acquisition.recording.motion_plan import JointSeries, MotionPlan
 from acquisition.recording.rig import Rig
 from calibrate.errors import DataError
 from calibrate.excitation.catalogue_sigmas import LEAST_SHARE, NOISE_SHARE, TorqueInformation, torque_information
+from calibrate.model.arms.coupled_readings import by_reading
 
 Floats = NDArray[np.float64]
 Clear = Callable[[Floats, float], bool]  # readings (moment, joint) and the time between them (s): all of it allowed
@@ -153,10 +154,24 @@ def _null_space(row: NDArray[np.int64]) -> Floats:
     return out
 
 
+def _refuse(rig: Rig) -> None:
+    """DataError where no motion can be designed, whatever is drawn."""
+    if by_reading(rig.arm) is not None:
+        raise DataError(f"rig {rig.name}: a joint follows another one; torques of such drives are not told apart")
+    home_rad = rig.motion.home_rad or ()
+    for i, (joint, home) in enumerate(zip(rig.arm.joints, home_rad, strict=False), start=1):
+        if min(home - joint.lower_rad, joint.upper_rad - home) <= MARGIN_RAD:
+            raise DataError(
+                f"rig {rig.name}: joint {i} at home_rad ({home:.4g} rad) is within {MARGIN_RAD:g} rad of an end of its "
+                "range; move home_rad of [motion] towards the middle"
+            )
+
+
 def excite(
     rig: Rig, wish: ExcitationWish, clear: Clear, progress: Callable[[int, int], None] = lambda done, total: None
 ) -> Excitation:
     """The best of the drawn motions, improved. DataError where none is clear, or the noise is not known."""
+    _refuse(rig)
     maker, rng = _Maker(rig, wish, clear), np.random.default_rng(wish.seed)
     offered: list[tuple[float, int, _Shape, MotionPlan]] = []
     for done in range(DRAWN):

@@ -21,6 +21,7 @@ from calibrate.model.torque_records import TorquesOfModel
 
 Floats = NDArray[np.float64]
 
+SMALL = 0.01  # of the trace of a tensor: not worth a word
 LEAST_KG_M2 = 1e-6  # of the smallest inertia of a body, as `boundinertia` of the file
 
 
@@ -66,7 +67,7 @@ def moving_arm(rig: Rig, torques: TorquesOfModel) -> MovingArm:
     gravity, left = np.array(torques.gravity_m_s2), list[str]()
     for effect in torques.effects:
         values = list(effect.coefficients.values())
-        if effect.physics == "payload":
+        if effect.physics == "payload" and links[-1, 0] + values[0] > 0.0:
             links[-1, : len(values)] += values
         elif effect.physics == "gravity-direction":
             gravity = gravity + cross_matrix(np.array([*values, 0.0])) @ np.array(torques.gravity_m_s2)
@@ -75,7 +76,13 @@ def moving_arm(rig: Rig, torques: TorquesOfModel) -> MovingArm:
         else:
             left.append(_in_numbers(effect))
     joints = tuple(JointAttributes(**hinge) for hinge in hinges)
-    bodies = tuple(_body(T, link) for T, link in zip(_to_bodies(rig, n), links, strict=True))
+    made = [_body(T, link) for T, link in zip(_to_bodies(rig, n), links, strict=True)]
+    bodies = tuple(body for body, _ in made)
+    left += [
+        f"Inertia of link {i} is larger by {short:.2g} kg m2 than that of the model, which no body has"
+        for i, (body, short) in enumerate(made, start=1)
+        if short > SMALL * float(np.sum(body.inertia_kg_m2[:3]))
+    ]
     x, y, z = gravity.tolist()
     return MovingArm(bodies, joints, (x, y, z), (*torques.notes, *left))
 
@@ -90,8 +97,10 @@ Hinge = dict[str, float]
 
 def _adds(word: str) -> Callable[[Hinge, list[float], TorquesOfModel, EffectRecord], bool]:
     def put(hinge: Hinge, values: list[float], torques: TorquesOfModel, effect: EffectRecord) -> bool:
-        hinge[word] = hinge.get(word, 0.0) + values[0]
-        return hinge[word] >= 0.0
+        total = hinge.get(word, 0.0) + values[0]
+        if total >= 0.0:
+            hinge[word] = total
+        return total >= 0.0
 
     return put
 
@@ -133,7 +142,8 @@ def _to_bodies(rig: Rig, n: int) -> list[Floats]:
     return out
 
 
-def _body(T_body_link: Floats, link: Floats) -> Body:
+def _body(T_body_link: Floats, link: Floats) -> tuple[Body, float]:
+    """And by how much its inertia had to be made larger, kg m²."""
     mass, R = float(link[0]), T_body_link[:3, :3]
     centre = link[1 : len(NUMBERS) - 6] / mass
     xx, yy, zz, xy, xz, yz = link[4:]
@@ -141,4 +151,4 @@ def _body(T_body_link: Floats, link: Floats) -> Body:
     w = np.linalg.eigvalsh(about)
     short = LEAST_KG_M2 + max(0.0, -float(w[0]), float(w[2] - w[1] - w[0]))
     turned = R @ about @ R.T + short * np.eye(3)  # points, rods and plates are no bodies to MuJoCo
-    return Body(mass, R @ centre + T_body_link[:3, 3], turned[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]])
+    return Body(mass, R @ centre + T_body_link[:3, 3], turned[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]), short

@@ -60,6 +60,7 @@ def _joint(name: str, kind: str, links: tuple[str, str], T_parent_child: Floats)
     ]
 
 
+NO_PAYLOAD = "A payload is not in this file: attach its mass to the body flange, and soft joints yield to it."
 SPRING = "_spring"
 AT_REST = ' armature="1"'  # without known rotors: inertia moves no arm that stands
 DAMPING_S = 0.1  # of stiffness: springs come to rest within seconds and do not ring
@@ -74,7 +75,7 @@ def mjcf_text(arm: IdentifiedArm) -> str:
         f"<mujoco model={quoteattr(arm.rig.name)}>",
         f"  <!-- Identified by calibeam. m, rad, kg; {arm.sign}. -->",
         *(f"  <!-- {says.replace('--', '- -')} -->" for says in not_carried),
-        "  <!-- A payload is not in this file: attach its mass to the body flange, and soft joints yield to it. -->",
+        *([f"  <!-- {NO_PAYLOAD} -->"] if moving is None else []),
         f"  {LEAST}",
         f'  <option gravity="{_numbers(arm.rig.arm.gravity_m_s2 if moving is None else moving.gravity_m_s2)}"/>',
         "  <worldbody>",

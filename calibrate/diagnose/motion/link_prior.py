@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.recording.rig import Rig
+from calibrate.errors import DataError
 from calibrate.model.arms.inverse_dynamics import NUMBERS
 from calibrate.model.parameters import Parameter
 from calibrate.model.torque_records import TorquesOfModel
@@ -51,6 +52,8 @@ class LinkPrior:
 
 def link_prior(rig: Rig, known: TorquesOfModel | None = None) -> LinkPrior:
     """About what the rig file states, or what is known beside it."""
+    if known is not None and len(known.links) != rig.n_joints:
+        raise DataError(f"{known.source}: torques of {len(known.links)} joints, the arm of the rig has {rig.n_joints}")
     stated, sigma = _stated(rig) if known is None else _about(rig, known)
     ways = np.diag(sigma)
     if known is not None and known.triangle:

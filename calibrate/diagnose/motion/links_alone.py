@@ -3,6 +3,7 @@ the links alone fitted to its torques.
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -119,6 +120,7 @@ def motion_drivers(rig: Rig, motion: Motion, known: TorquesOfModel | None = None
         middle_rad=middle_rad,
         temperature_degC=heat,
         reference_degC=reference,
+        begin_s=motion.begin_s,
     )
 
 
@@ -144,11 +146,11 @@ def _with_rotors(links: Floats, by_rotor: Floats) -> Floats:
 
 
 def listed_torques(effects: Sequence[EffectRecord], drivers: MotionDrivers) -> tuple[Accepted, ...]:
-    """Each with its term; one that this motion has no place for (ripple of a joint that stands) is left out.
+    """Each with its term; one that nothing was recorded for (friction by temperature) is left out.
 
     DataError where the numbers of an effect do not fit its form.
     """
-    terms = torque_terms(drivers)
+    terms = torque_terms(replace(drivers, known=True))
     listed = [_accepted(one, term) for one in effects for term in terms if _is(one, term)]
     return (*listed, *(_drawn(one, one.waves, drivers) for one in effects if one.waves is not None))
 

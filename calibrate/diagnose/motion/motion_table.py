@@ -19,6 +19,7 @@ from acquisition.recording import Recording
 from calibrate.diagnose.streams import StreamDevice, Track, devices_of
 from calibrate.diagnose.streams.recorded import start_between
 from calibrate.diagnose.streams.track import SIGMA_OF_MEDIAN
+from calibrate.model.arms.coupled_readings import by_reading
 from calibrate.model.effects.torque import Samples
 
 Floats = NDArray[np.float64]
@@ -54,6 +55,7 @@ class Motion:
     speed_sigma_rad_s: Floats  # (joint,) that the noise of the angles leaves
     acceleration_sigma_rad_s2: Floats  # (joint,)
     samples: Samples  # from which the moments were taken
+    begin_s: float  # of the whole motion, also where this is a part of it
 
     @property
     def made(self) -> str:
@@ -76,8 +78,10 @@ class Filtered:
 
 
 def motion_of(recording: Recording) -> Motion | None:
-    """None without joint angles and torques of one and the same time, or where they are too few."""
-    made = filtered_of(recording)
+    """None without joint angles and torques of one and the same time, or where they are too few; and of an arm with a
+    joint that follows another one: the torques of such drives are shared out between two joints.
+    """
+    made = None if by_reading(recording.rig.arm) is not None else filtered_of(recording)
     return None if made is None or not made.runs else _thinned(made.runs, recording, made.band_hz, made.period_s)
 
 
@@ -112,7 +116,8 @@ def planned_motion(time_s: Floats, q: Floats, qd: Floats, qdd: Floats, jerk: Flo
     """Of a plan, (moment, joint) each; torques are not known, and take no part."""
     still, none = STILL_SHARE * np.abs(qd).max(axis=0) + 1e-9, np.zeros(q.shape[1])
     samples = Samples.as_planned(q, qd)
-    return Motion(time_s, q, qd, qdd, jerk, np.full_like(q, np.nan), still, None, BAND_HZ, none, none, samples)
+    nothing, begin_s = np.full_like(q, np.nan), float(time_s[0])
+    return Motion(time_s, q, qd, qdd, jerk, nothing, still, None, BAND_HZ, none, none, samples, begin_s)
 
 
 def moments_in(length_s: float) -> float:
@@ -194,7 +199,7 @@ def _thinned(runs: list[Run], recording: Recording, band_hz: float, period_s: fl
     heat = _temperatures(recording, time_s, q.shape[1])
     samples = _samples(runs, step, lambda values: _low_pass(values, band_hz, period_s))
     sigmas = speed * noise, acceleration * noise
-    return Motion(time_s, q, qd, qdd, jerk, torque, still, heat, band_hz, *sigmas, samples)
+    return Motion(time_s, q, qd, qdd, jerk, torque, still, heat, band_hz, *sigmas, samples, float(time_s[0]))
 
 
 def _samples(runs: list[Run], step: int, low_pass: Callable[[Floats], Floats]) -> Samples:

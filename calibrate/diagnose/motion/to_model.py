@@ -60,7 +60,7 @@ def torques_of_state(
         source=source,
         links=tuple(tuple(row) for row in bodies[: n * len(NUMBERS)].reshape(n, -1).tolist()),
         rotors_kg_m2=tuple(bodies[n * len(NUMBERS) :].tolist()),
-        gravity_m_s2=drivers.rig.arm.gravity_m_s2,
+        gravity_m_s2=drivers.rig.arm.gravity_m_s2 if known is None else known.gravity_m_s2,
         effects=effects if known is None else _together(known.effects, effects),
         middle_rad=tuple(drivers.middle_rad.tolist()),
         reference_degC=() if drivers.reference_degC is None else tuple(drivers.reference_degC.tolist()),

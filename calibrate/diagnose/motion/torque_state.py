@@ -18,7 +18,7 @@ from calibrate.diagnose.state.linearised import UnseenMisfits, WhitenedRows
 from calibrate.fit.noise import Scatter, likelihood_of, scatter_of, sigma_about_zero
 from calibrate.fit.solvers import NEAR_START, solve
 from calibrate.model.arms.inverse_dynamics import NUMBERS
-from calibrate.model.effects.term import Accepted, Term
+from calibrate.model.effects.term import Accepted, Form, Term
 from calibrate.model.effects.torque import LOADS, PAYLOAD, MotionDrivers, torque_terms
 from calibrate.model.parameters import plausible_sizes, priors, start_values
 
@@ -114,7 +114,11 @@ class TorqueState:
 
     @cached_property
     def _candidates(self) -> tuple[Term, ...]:
-        return torque_terms(self.drivers)
+        """Beside what is known a change may have either sign."""
+        terms = torque_terms(self.drivers)
+        if not self.problem.given:
+            return terms
+        return tuple(term.of_a_difference() if isinstance(term, Form) else term for term in terms)
 
     def refitted(self, accepted: Sequence[Accepted]) -> "TorqueState":
         terms = tuple(accepted)

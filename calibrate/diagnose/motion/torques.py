@@ -27,7 +27,6 @@ from calibrate.diagnose.record.schema import (
     TorquesRecord,
 )
 from calibrate.diagnose.record.to_file import finding_record, unexplained_record
-from calibrate.model.arms.coupled_readings import by_reading
 from calibrate.model.effect_records import EffectRecord
 from calibrate.model.effects.term import Accepted, Missing
 from calibrate.model.effects.torque import TORQUES, friction
@@ -63,8 +62,7 @@ def diagnose_torques(
     None where the recording holds no torques beside joint angles, or too few of them in motion; and of an arm with a
     joint that follows another one.
     """
-    coupled = by_reading(recording.rig.arm) is not None  # torques of such drives are shared out between two joints
-    motion = None if coupled else motion_of(recording)
+    motion = motion_of(recording)
     return None if motion is None else diagnose_motion(recording.rig, motion, rng, known)
 
 

@@ -27,7 +27,7 @@ def test_a_small_motion_about_home_is_clear_and_driven_as_it_is() -> None:
 
 
 def test_a_motion_that_is_too_fast_is_refused_not_stretched() -> None:
-    with pytest.raises(RefusedMotionError, match=r"has 7\.\d+ times the acceleration"):
+    with pytest.raises(RefusedMotionError, match=r"has 8\.\d+ times the acceleration"):
         check_motion(RIG, motion(0.05, length_s=0.4))
 
 

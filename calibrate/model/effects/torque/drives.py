@@ -51,7 +51,7 @@ def _ripple(drivers: Drivers) -> tuple[Term, ...]:
     return tuple(
         term
         for i, order, cycles in waves
-        if _shows(drivers, i, cycles)
+        if drivers.known or _shows(drivers, i, cycles)
         for term in at_joints(
             drivers,
             "gear-ripple",

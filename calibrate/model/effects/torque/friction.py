@@ -99,7 +99,7 @@ def _cold(drivers: Drivers) -> tuple[Term, ...]:
         ("friction_nm_per_k",),
         LIMIT_NM / 20.0,
         "Joint {joint} needs {friction_nm_per_k} more to turn as it warms up",
-        among=[i for i in joints(drivers) if spread_k[i - 1] > SPREAD_K],
+        among=[i for i in joints(drivers) if drivers.known or spread_k[i - 1] > SPREAD_K],
         reversed_sentence="Joint {joint} needs {friction_nm_per_k} more to turn the colder it is: bearing or grease",
     )
 
@@ -111,8 +111,10 @@ def _warmth(drivers: MotionDrivers) -> Floats:
 
 
 def _run_in(drivers: Drivers) -> tuple[Term, ...]:
+    if not isinstance(drivers, MotionDrivers):
+        return ()
     length_s = float(np.ptp(drivers.t_s)) if len(drivers.t_s) else 0.0
-    grid = tuple(one for one in RUN_IN_S if length_s > 2.0 * one)
+    grid = tuple(one for one in RUN_IN_S if drivers.known or length_s > 2.0 * one)
     if not grid:
         return ()
     return at_joints(
@@ -120,7 +122,7 @@ def _run_in(drivers: Drivers) -> tuple[Term, ...]:
         "running-in",
         Shape.EXPONENTIAL,
         ("qd{joint}", "t"),
-        lambda d, inner, i: (d.sense(i) * np.exp(-(d.t_s - d.t_s.min()) / inner[0]))[:, None],
+        lambda d, inner, i: (d.sense(i) * np.exp(-(d.t_s - d.begin_s) / inner[0]))[:, None],
         ("friction_nm",),
         LIMIT_NM,
         "Joint {joint} needs {friction_nm} more to turn at first, with a time constant of {time_constant_s}",

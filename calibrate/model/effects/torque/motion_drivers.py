@@ -58,6 +58,8 @@ class MotionDrivers(Drivers):
     middle_rad: Floats  # (joint,) what the way of a spring is counted from
     temperature_degC: Floats | None = None  # (moment, joint)
     reference_degC: Floats | None = None  # (joint,) what friction by temperature is counted from
+    begin_s: float  # of the whole motion: what running-in is counted from
+    known: bool = False  # terms are those of a model: also such as this motion alone would not show
 
     @property
     def clock_is_a_cause(self) -> bool:
