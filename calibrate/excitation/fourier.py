@@ -157,7 +157,7 @@ def _null_space(row: NDArray[np.int64]) -> Floats:
 def _refuse(rig: Rig) -> None:
     """DataError where no motion can be designed, whatever is drawn."""
     if by_reading(rig.arm) is not None:
-        raise DataError(f"rig {rig.name}: a joint follows another one; torques of such drives are not told apart")
+        raise DataError(f"rig {rig.name}: a joint follows another one; torques of such drives cannot be separated")
     home_rad = rig.motion.home_rad or ()
     for i, (joint, home) in enumerate(zip(rig.arm.joints, home_rad, strict=False), start=1):
         if min(home - joint.lower_rad, joint.upper_rad - home) <= MARGIN_RAD:
