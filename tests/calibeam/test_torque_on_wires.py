@@ -3,6 +3,7 @@
 """
 
 import json
+import math
 import re
 import subprocess
 import sys
@@ -21,6 +22,7 @@ from simulators.ur.readout import TORQUE_PER_CURRENT_NM_A
 RIG = Path(__file__).parents[2] / "rigs" / "ur5e-dual-psd.toml"
 FRICTION_NM = 4.0
 TIME_SCALE = 2
+OF_ITS_SIZE = 0.02
 
 
 def rig_text() -> str:
@@ -80,13 +82,19 @@ def of_controller(finding: dict[str, Any]) -> bool:
     return finding["parameters"]["delay_s"]["value"] == pytest.approx(1.5e-3, abs=0.7e-3)
 
 
+def friction_nm(finding: dict[str, Any]) -> float:
+    """Size of a finding; infinite where it is none of friction or states none."""
+    size = finding["parameters"].get("friction_nm", {}).get("value")
+    return math.inf if size is None else abs(size)
+
+
 def test_dry_friction_is_named_at_its_joint_with_its_size(recorded: Path, tmp_path: Path) -> None:
     out = tmp_path / "diagnosis.json"
     assert run(["diagnose", str(recorded), "--out", str(out)]) == 0
     said = json.loads(out.read_text(encoding="utf-8"))
     found = [one for one in said["findings"] if one["share"] > 0.01 and not of_controller(one)]
     assert [(one["physics"], one["where"]) for one in found] == [("coulomb-friction", "joint3.torque")]
-    assert found[0]["parameters"]["friction_nm"]["value"] == pytest.approx(FRICTION_NM, rel=0.02)
+    assert found[0]["parameters"]["friction_nm"]["value"] == pytest.approx(FRICTION_NM, rel=OF_ITS_SIZE)
 
 
 def test_the_simulation_of_its_rig_file_is_brought_to_move_as_the_robot(recorded: Path, tmp_path: Path) -> None:
@@ -108,8 +116,9 @@ def test_a_model_of_it_moves_on_in_mujoco_and_knows_what_is_not_new(recorded: Pa
     assert run(["diagnose", str(recorded), "--model-out", str(model), *own]) == 0
     assert run(["export-model", str(model), "--to", "mjcf", "--out", str(arm)]) == 0
     loaded = mujoco.MjModel.from_xml_path(str(arm))
-    assert loaded.dof_frictionloss[2] == pytest.approx(FRICTION_NM, rel=0.02)
+    assert loaded.dof_frictionloss[2] == pytest.approx(FRICTION_NM, rel=OF_ITS_SIZE)
     assert run(["diagnose", str(recorded), "--model", str(model), *own]) == 0
     said = json.loads((tmp_path / "diagnosis.json").read_text(encoding="utf-8"))
     assert said["torques"]["known"]
-    assert [one for one in said["findings"] if one["share"] > 0.01 and one["where"] == "joint3.torque"] == []
+    at_joint = [one for one in said["findings"] if one["where"] == "joint3.torque"]
+    assert [one for one in at_joint if friction_nm(one) > OF_ITS_SIZE * FRICTION_NM] == []
