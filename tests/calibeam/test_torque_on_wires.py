@@ -3,7 +3,6 @@
 """
 
 import json
-import math
 import re
 import subprocess
 import sys
@@ -82,12 +81,6 @@ def of_controller(finding: dict[str, Any]) -> bool:
     return finding["parameters"]["delay_s"]["value"] == pytest.approx(1.5e-3, abs=0.7e-3)
 
 
-def friction_nm(finding: dict[str, Any]) -> float:
-    """Size of a finding; infinite where it is none of friction or states none."""
-    size = finding["parameters"].get("friction_nm", {}).get("value")
-    return math.inf if size is None else abs(size)
-
-
 def test_dry_friction_is_named_at_its_joint_with_its_size(recorded: Path, tmp_path: Path) -> None:
     out = tmp_path / "diagnosis.json"
     assert run(["diagnose", str(recorded), "--out", str(out)]) == 0
@@ -120,5 +113,7 @@ def test_a_model_of_it_moves_on_in_mujoco_and_knows_what_is_not_new(recorded: Pa
     assert run(["diagnose", str(recorded), "--model", str(model), *own]) == 0
     said = json.loads((tmp_path / "diagnosis.json").read_text(encoding="utf-8"))
     assert said["torques"]["known"]
-    at_joint = [one for one in said["findings"] if one["where"] == "joint3.torque"]
-    assert [one for one in at_joint if friction_nm(one) > OF_ITS_SIZE * FRICTION_NM] == []
+    (joint,) = (one for one in said["torques"]["joints"] if one["joint"] == 3)
+    assert joint["unseen_before_nm"] < OF_ITS_SIZE * FRICTION_NM  # beside the model, before anything is found
+    again = [one for one in said["findings"] if (one["physics"], one["where"]) == ("coulomb-friction", "joint3.torque")]
+    assert all(abs(one["parameters"]["friction_nm"]["value"]) < OF_ITS_SIZE * FRICTION_NM for one in again)

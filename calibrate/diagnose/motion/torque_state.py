@@ -19,7 +19,7 @@ from calibrate.fit.noise import Scatter, likelihood_of, scatter_of, sigma_about_
 from calibrate.fit.solvers import NEAR_START, solve
 from calibrate.model.arms.inverse_dynamics import NUMBERS
 from calibrate.model.effects.term import Accepted, Form, Term
-from calibrate.model.effects.torque import LOADS, PAYLOAD, MotionDrivers, torque_terms
+from calibrate.model.effects.torque import LOADS, PAYLOAD, STICTION, MotionDrivers, torque_terms
 from calibrate.model.parameters import plausible_sizes, priors, start_values
 
 Floats = NDArray[np.float64]
@@ -114,11 +114,15 @@ class TorqueState:
 
     @cached_property
     def _candidates(self) -> tuple[Term, ...]:
-        """Beside what is known a change may have either sign."""
+        """Beside what is known a change may have either sign; but for stiction: how fast friction turns with the motion
+        is not known, and looks like less of it at the lowest speeds.
+        """
         terms = torque_terms(self.drivers)
         if not self.problem.given:
             return terms
-        return tuple(term.of_a_difference() if isinstance(term, Form) else term for term in terms)
+        return tuple(
+            term.of_a_difference() if isinstance(term, Form) and term.physics != STICTION else term for term in terms
+        )
 
     def refitted(self, accepted: Sequence[Accepted]) -> "TorqueState":
         terms = tuple(accepted)

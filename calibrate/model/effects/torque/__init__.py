@@ -24,9 +24,22 @@ TORQUES: tuple[Kind, ...] = (
 )
 
 
+STICTION = friction.STRIBECK.physics
+
+
 def torque_terms(drivers: MotionDrivers) -> tuple[Term, ...]:
     """Every place and form that the motion allows, and what stands for friction of no catalogue."""
     return (*(term for kind in TORQUES for term in kind.terms(drivers)), *friction.uneven(drivers))
 
 
-__all__ = ["LOADS", "PAYLOAD", "TORQUES", "MotionDrivers", "Samples", "at_joints", "torque_port", "torque_terms"]
+__all__ = [
+    "LOADS",
+    "PAYLOAD",
+    "STICTION",
+    "TORQUES",
+    "MotionDrivers",
+    "Samples",
+    "at_joints",
+    "torque_port",
+    "torque_terms",
+]
