@@ -115,7 +115,7 @@ class TorqueState:
     @cached_property
     def _candidates(self) -> tuple[Term, ...]:
         """Beside what is known a change may have either sign; but for stiction: how fast friction turns with the motion
-        is not known, and looks like less of it at the lowest speeds.
+        is not known, and shows as less of it at the lowest speeds.
         """
         terms = torque_terms(self.drivers)
         if not self.problem.given:
