@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.recording import Recording, read
+from acquisition.recording.examination import ExaminationRecord
 from acquisition.recording.rig import Rig
 from calibeam.cli import run
 from calibrate.diagnose.motion import TorqueDiagnosis, expected_nm, torques_of_model
@@ -71,8 +72,8 @@ def recording_of(folder: Path, record: str, out: Path) -> Recording:
 def motion_in(recording: Recording) -> Motion:
     """ValueError where the recording shows no torques."""
     motion = motion_of(recording)
-    if motion is None:
-        raise ValueError(f"{recording.path}: no torques in motion")
+    if isinstance(motion, ExaminationRecord):
+        raise ValueError(f"{recording.path}: {motion.reason}")
     return motion
 
 

@@ -11,6 +11,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from acquisition.recording.examination import ExaminationRecord
 from benchmarks.drawn_motion import Hidden, recorded
 from calibrate.diagnose.motion.torques import diagnose_torques
 
@@ -34,8 +35,8 @@ def measured() -> str:
     begun = time.process_time()
     found = diagnose_torques(recording, np.random.default_rng(1))
     spent_s = time.process_time() - begun
-    if found is None:
-        raise ValueError("no torques in motion")
+    if isinstance(found, ExaminationRecord):
+        raise ValueError(found.reason)
     peak_mb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / KILOBYTES_PER_MB
     tried, causes = len(found.bare.candidates()), len(found.diagnosis.findings)
     return f"10 s at 500 Hz, 6 joints, {tried} candidates: {spent_s:.1f} s of CPU, {peak_mb:.0f} MB, {causes} causes"

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.recording import read
+from acquisition.recording.examination import ExaminationRecord
 from acquisition.recording.rig import Rig
 from benchmarks.motion import SEED, by_least_squares, rms
 from benchmarks.proof_comparison import read_proof
@@ -80,7 +81,7 @@ def answers_of(order: tuple[Path, str]) -> dict[str, Answer]:
     layout, name = Layout(order[0]), order[1]
     recording, truth = read(layout.recording(name)), truth_of(layout.revealed(name).read_bytes())
     found, motion = reconcile_motion(recording, None, np.random.default_rng(SEED)), motion_of(recording)
-    if found is None or motion is None:
+    if isinstance(found, ExaminationRecord) or isinstance(motion, ExaminationRecord):
         raise ValueError(f"{recording.path}: no torques in motion; make the proof again")
     rig, (seen, unseen) = recording.rig, motion_in_two(motion)
     sigma_nm = PASSED * np.array(truth.torque_sigma_nm)

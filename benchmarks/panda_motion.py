@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from acquisition.recording import Recording, read
+from acquisition.recording.examination import ExaminationRecord
 from benchmarks.motion import SEED, friction_of, left_by_least_squares_nm
 from calibeam.cli import run
 from calibrate.diagnose.motion import reconcile_motion
@@ -59,7 +60,7 @@ def lines(folder: Path) -> Iterator[str]:
     with tempfile.TemporaryDirectory() as work:
         recording = recording_of(folder, Path(work))
     found, motion = reconcile_motion(recording, None, np.random.default_rng(SEED)), motion_of(recording)
-    if found is None or motion is None:
+    if isinstance(found, ExaminationRecord) or isinstance(motion, ExaminationRecord):
         raise ValueError(f"{folder}: no torques in motion")
     plain = left_by_least_squares_nm(recording.rig, *motion_in_two(motion))
     yield found.found.motion.made

@@ -5,6 +5,7 @@ from pathlib import Path
 import msgspec
 
 from acquisition.recording import Recording, read
+from acquisition.recording.examination import ExaminationRecord
 from acquisition.recording.files import write_json
 from acquisition.recording.rig import rig_text
 from calibeam.console import Console
@@ -13,7 +14,6 @@ from calibeam.printing.comparison_lines import print_reconciliation
 from calibeam.results.identification import naming_source
 from calibeam.results.motion_reconciliation import (
     DESCRIPTIONS,
-    NO_TORQUES,
     MotionPart,
     reconcile_torques,
     torques_stated,
@@ -22,6 +22,7 @@ from calibeam.results.motion_reconciliation import (
 from calibeam.results.reconciliation import Reconciled, reconcile
 from calibeam.results.reconciliation_page import write_reconciliation_page
 from calibeam.simulation.replayed_recording import write_replayed
+from calibrate.compare.examinations import examined
 from calibrate.compare.reconciled_rows import ReconcileFile
 from calibrate.diagnose.motion import model_of_motion, with_torques
 from calibrate.diagnose.record.file import write_diagnosis
@@ -72,9 +73,10 @@ def reconcile_command(
     with naming_source(measured):
         part = reconcile_torques(source, torques_stated(simulation, source.rig), simulation.name)
         found = _of_poses(source, simulation, seed) if len(source.samples) else None
-        if found is None and part is None:
-            raise DataError(f"{measured}: no samples, and {NO_TORQUES}")
-    file = with_motion(None if found is None else found.file, part)
+        if found is None and isinstance(part, ExaminationRecord):
+            raise DataError(f"{measured}: no samples, and the torques are not examined: {part.reason}; {part.remedy}")
+    file = examined(with_motion(None if found is None else found.file, part), part)
+    part = None if isinstance(part, ExaminationRecord) else part
     with taken_back(out):
         _write(out, found, part, file, source)
     if json:

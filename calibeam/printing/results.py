@@ -6,10 +6,10 @@ from collections.abc import Iterator
 
 from rich.table import Table
 
+from acquisition.recording.examination import not_examined_lines
 from calibeam.console import Console
 from calibrate.diagnose.record.schema import ClockRecord, DiagnosisFile, FindingRecord, TorquesRecord, of_poses
 from calibrate.model.effects.term import with_sigma
-from calibrate.quantities import counted
 from calibrate.report.diagnosis import (
     SPLITS,
     before_after,
@@ -66,6 +66,7 @@ def _brief(file: DiagnosisFile) -> Iterator[str]:
     yield from _few([f"noise: {line}" for line in noise_words(file)])
     yield from limit_words(file)
     yield from _few([f"not completed: {one.stage}: {one.reason}" for one in file.incomplete])
+    yield from _few(list(not_examined_lines(file.examinations)))
     yield from _few(missing_lines(file))
     yield from _few([f"next: {line}" for line in file.next])
 
@@ -110,24 +111,25 @@ def _print_details(console: Console, file: DiagnosisFile) -> None:
     _print_torques(console, file)
     for one in file.incomplete:
         console.print(f"not completed: {one.stage}: {one.reason}", highlight=False, markup=False)
+    for line in not_examined_lines(file.examinations):
+        console.print(line, highlight=False, markup=False)
     for line in file.next:
         console.print(f"next: {line}", highlight=False, markup=False)
 
 
 def print_streams(console: Console, file: DiagnosisFile) -> None:
     """Of a recording without samples: each clock with its uncertainty, findings, and what the streams do not show."""
-    count = len(file.findings)
-    found = f"{counted(count, 'cause')} found" if count else "no fault found"
-    console.print(f"\nStreams only: {found}; no settled poses were recorded.", style="bold", highlight=False)
+    console.print(f"\n{verdict_words(file)}", style="bold", highlight=False)
     lines = [line for number, finding in enumerate(file.findings, start=1) for line in _finding(number, finding)]
     if file.streams is not None:
         lines += [line for clock in file.streams.clocks for line in _clock(clock)]
         lines += [f"usual: {one.says}" for one in file.streams.usual]
-        lines += [f"not tested: {says}" for says in file.streams.unseen]
     for line in lines:
         console.print(line, highlight=False, markup=False)
     _print_torques(console, file)
-    for line in (*_unexplained(file), *(f"next: {says}" for says in file.next)):
+    failed = (f"not completed: {one.stage}: {one.reason}" for one in file.incomplete)
+    ends = not_examined_lines(file.examinations)
+    for line in (*_unexplained(file), *failed, *ends, *(f"next: {says}" for says in file.next)):
         console.print(line, highlight=False, markup=False)
 
 

@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from acquisition.recording import Recording
+from acquisition.recording.examination import ExaminationRecord
 from calibeam.results.diagnosis import SEED
 from calibeam.results.simulator import simulated_by_model
 from calibeam.simulation.described_torques import described_torques
@@ -47,9 +48,6 @@ def compare_torques(measured: Recording, simulation: Path, samples: ComparisonFi
     """
     known = described_torques(simulation, measured.rig)
     found = diagnose_torques(measured, np.random.default_rng(SEED), known)
-    if found is None:
-        raise DataError(
-            "no torques beside joint angles in motion, or too few: record the arm in motion "
-            "(docs/motion-recordings.md), or compare without --simulation"
-        )
+    if isinstance(found, ExaminationRecord):
+        raise DataError(f"torques are not compared: {found.reason}; {found.remedy}; or compare without --simulation")
     return torques_compared(measured, known, found, SOFTWARE, samples)

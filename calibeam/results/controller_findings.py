@@ -8,10 +8,12 @@ from scipy.spatial.transform import Rotation
 
 from acquisition.recording import Finding, Recording
 from acquisition.recording.check_recording import Problem, Severity
+from acquisition.recording.examination import Examination, ExaminationRecord
 from acquisition.recording.output import toml_output, write_output
 from acquisition.recording.rig import ArmModel, Rig
 from acquisition.recording.samples import CONTROLLER
 from calibeam.new_rig.drawn import rig_file_text
+from calibrate.diagnose.record.schema import DiagnosisFile
 from calibrate.errors import DataError
 from calibrate.fit.controller_arm import FEWEST, ROUNDING, ControllerArm, ControllerPoses, controller_arm
 from calibrate.model.arms.convert import convert, pose_of
@@ -19,6 +21,11 @@ from calibrate.model.rigid import transform
 from calibrate.quantities import angle, angle_with_sigma, counted, length, length_with_sigma
 
 RIG_FILE = toml_output(("schema", "arm"), "rig file")
+CONTROLLER_ARM = Examination(
+    "arm of the controller",
+    CONTROLLER,
+    f"record the robot with its tool poses in {FEWEST} or more different poses (columns {', '.join(CONTROLLER)})",
+)
 UNRELATED_M = 1e-3  # no arm leaves as much; angles and poses of other times do
 MOST = 8  # differences in one sentence
 
@@ -49,6 +56,28 @@ def _unrelated(found: ControllerArm) -> str:
     )
 
 
+def controller_examination(recording: Recording, found: ControllerArm | None) -> ExaminationRecord:
+    """How the comparison of the controller's arm with that of the rig file ended."""
+    findings = controller_findings(found)
+    if findings:
+        return CONTROLLER_ARM.found("; ".join(f.says for f in findings), findings[0].where)
+    if found is not None:
+        return CONTROLLER_ARM.nothing(max(found.left_m, ROUNDING), "m", found.source)
+    poses = ControllerPoses.of(recording)
+    if poses is not None:
+        why = f"{len(poses.q_rad)} different poses of the controller's tool, fewer than {FEWEST}"
+        return CONTROLLER_ARM.not_examined(why, poses.source)
+    if ControllerPoses.recorded(recording):
+        return CONTROLLER_ARM.not_examined("no valid pose of the controller's tool")
+    return CONTROLLER_ARM.not_examined("no poses of the controller's tool were recorded", expected=False)
+
+
+def with_controller(file: DiagnosisFile, recording: Recording) -> DiagnosisFile:
+    """With how the examination of the controller's arm ended."""
+    ending = controller_examination(recording, arm_of_controller(recording))
+    return msgspec.structs.replace(file, examinations=(*file.examinations, ending))
+
+
 def controller_notes(recording: Recording) -> tuple[str, ...]:
     """The same for results of a fit: only where the arm or its base differs, which `correct` has to know."""
     return tuple(f.says for f in controller_findings(arm_of_controller(recording)) if f.severity is Severity.WARNING)
@@ -56,10 +85,7 @@ def controller_notes(recording: Recording) -> tuple[str, ...]:
 
 def sentence(found: ControllerArm) -> str:
     """What differs, with one sigma."""
-    point, turn = found.T_flange_tool[:3, 3], Rotation.from_matrix(found.T_flange_tool[:3, :3]).as_euler("xyz", True)
-    at = ", ".join(f"{1e3 * v:z.3f}" for v in point.tolist())
-    turned = ", ".join(f"{v:z.2f}" for v in turn.tolist())
-    tool = f"its tool is at {at} mm in the flange, turned by {turned}° about x, y, z"
+    tool = _tool(found)
     m, rad = (max(value, ROUNDING) for value in (found.left_m, found.left_rad))
     left = f"{found.poses} poses agree with it to {length(m, 2)} and {angle(rad, 2)} (rms)"
     if found.left_out:
@@ -78,6 +104,20 @@ def sentence(found: ControllerArm) -> str:
         f"the controller computes with another arm than the rig file: {', '.join(named)}{rest} (controller less rig "
         f"file){unknown}{tools}; {left}; `calibeam check --controller-arm` writes it as a rig file"
     )
+
+
+def _tool(found: ControllerArm) -> str:
+    """Where its tool is, each number with its sigma, and none that these poses do not determine."""
+    point, turn = found.T_flange_tool[:3, 3], Rotation.from_matrix(found.T_flange_tool[:3, :3]).as_euler("xyz")
+    sigma, open_ = found.tool_sigma, "not determined"
+    if sigma is None:
+        at = ", ".join(f"{1e3 * v:z.3f}" for v in point.tolist())
+        turned = ", ".join(f"{v:z.2f}" for v in np.degrees(turn).tolist())
+        return f"its tool is stated by it at {at} mm in the flange, turned by {turned}° about x, y, z"
+    along, about = (sigma[:3].tolist(), sigma[3:].tolist())
+    at = ", ".join(length_with_sigma(v, s) if np.isfinite(s) else open_ for v, s in zip(point, along, strict=True))
+    turned = ", ".join(angle_with_sigma(v, s) if np.isfinite(s) else open_ for v, s in zip(turn, about, strict=True))
+    return f"its tool is at {at} in the flange (x, y, z), turned by {turned} about x, y, z"
 
 
 def write_controller_arm(rig: Rig, found: ControllerArm | None, source: Path, path: Path) -> None:

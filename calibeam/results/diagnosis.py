@@ -9,10 +9,11 @@ import msgspec
 import numpy as np
 
 from acquisition.recording import Recording
+from acquisition.recording.examination import ExaminationRecord
 from acquisition.recording.motion_plan import no_torque
 from acquisition.recording.pose_plan import write_pose_plan
 from acquisition.recording.rig import Rig, rig_sha256
-from calibeam.results.controller_findings import controller_notes
+from calibeam.results.controller_findings import controller_notes, with_controller
 from calibeam.software import SOFTWARE
 from calibrate.diagnose.assess import Verdict
 from calibrate.diagnose.from_recording import Diagnosed, diagnose_samples
@@ -25,8 +26,10 @@ from calibrate.diagnose.motion import (
 )
 from calibrate.diagnose.new_poses import plan_of, separating
 from calibrate.diagnose.record.file import write_diagnosis
+from calibrate.diagnose.record.pose_examinations import pose_examinations
 from calibrate.diagnose.record.schema import (
     SCHEMA,
+    TORQUES_IN_MOTION,
     DiagnosisFile,
     IncompleteRecord,
     RigRecord,
@@ -46,6 +49,7 @@ SEED = 1  # of nulls, splits and bootstraps: the same recording always gives the
 
 Keep = Callable[[DiagnosisFile], None]
 
+REPORT = "report the recording as a fault of the program"
 NEXT_OF_AN_ARM = "record settled samples: streams alone show clocks, lags and faults, nothing of the geometry"
 NEXT_OF_ENCODERS = (
     "`calibeam check LOG` shows pace, eccentricity, slips and noise of the encoders; `calibeam compare ONE TWO` "
@@ -97,18 +101,21 @@ def diagnose_streams(
         )
     nothing = without_samples(recording.rig, recording.rig_text)
     torques = _torques_of(recording, model)
-    file = with_torques(with_streams(nothing, report), torques)
+    file = with_streams(nothing, report)
+    file = with_controller(with_torques(file, torques), recording) if recording.rig.n_joints else file
     if file.torques is not None:
         file = msgspec.structs.replace(file, next=tuple(one for one in file.next if one not in nothing.next))
     elif no_torque(recording.rig) and any(CURRENT in stream.values for stream in recording.streams.values()):
         file = msgspec.structs.replace(file, next=(*file.next, no_torque(recording.rig)))
     agree = file.verdict == Verdict.CONSISTENT.value
-    return torques, msgspec.structs.replace(file, verdict=Verdict.UNDECIDABLE.value) if agree else file
+    return _diagnosed_torques(torques), msgspec.structs.replace(
+        file, verdict=Verdict.UNDECIDABLE.value
+    ) if agree else file
 
 
 def without_samples(rig: Rig, text: str) -> DiagnosisFile:
     """Of a recording of streams alone, before these are looked at."""
-    return DiagnosisFile(
+    file = DiagnosisFile(
         schema=SCHEMA,
         verdict=Verdict.CONSISTENT.value,
         noise_floor_m=None,
@@ -120,6 +127,7 @@ def without_samples(rig: Rig, text: str) -> DiagnosisFile:
         software=SOFTWARE,
         rig=RigRecord(rig.name, rig_sha256(text)),
     )
+    return msgspec.structs.replace(file, examinations=pose_examinations(file) if rig.n_joints else ())
 
 
 def _diagnosed(
@@ -147,13 +155,20 @@ def _with_streams(
 ) -> tuple[Diagnosed, DiagnosisFile]:
     stages, fitted = Stages(), None if found.physics is None else found.physics.model
     whole = stages.attempt(Stage.STREAMS, lambda: with_streams(file, streams_of(recording, fitted)), file)
-    torques = stages.attempt(Stage.TORQUES, lambda: _torques_of(recording, model), None)
+    broken = TORQUES_IN_MOTION.not_examined("the stage failed", remedy=REPORT)
+    torques = stages.attempt(Stage.TORQUES, lambda: _torques_of(recording, model), broken)
     failed = tuple(IncompleteRecord(one.stage.value, one.reason) for one in stages.failed)
-    whole = with_torques(whole, torques)
-    return replace(found, torques=torques), msgspec.structs.replace(whole, incomplete=(*whole.incomplete, *failed))
+    whole = with_controller(with_torques(whole, torques), recording)
+    return replace(found, torques=_diagnosed_torques(torques)), msgspec.structs.replace(
+        whole, incomplete=(*whole.incomplete, *failed)
+    )
 
 
-def _torques_of(recording: Recording, model: ModelFile | None) -> TorqueDiagnosis | None:
+def _diagnosed_torques(found: TorqueDiagnosis | ExaminationRecord) -> TorqueDiagnosis | None:
+    return found if isinstance(found, TorqueDiagnosis) else None
+
+
+def _torques_of(recording: Recording, model: ModelFile | None) -> TorqueDiagnosis | ExaminationRecord:
     return diagnose_torques(recording, np.random.default_rng(SEED), None if model is None else model.torques)
 
 

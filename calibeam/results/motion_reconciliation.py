@@ -9,6 +9,7 @@ import msgspec
 import numpy as np
 
 from acquisition.recording import Recording
+from acquisition.recording.examination import ExaminationRecord
 from acquisition.recording.rig import Rig, load_rig
 from calibeam.results.diagnosis import SEED, without_samples
 from calibeam.simulation.closed_loop import tracked
@@ -32,7 +33,6 @@ from calibrate.quantities import counted, significant
 
 DESCRIPTIONS = (".xml", ".mjcf", ".urdf")
 OTHER_ARM = 0.02  # m, and of the axes of the flange: calibration moves them by less
-NO_TORQUES = "no torques beside joint angles in motion; record both, in one stream or two, for 20 s and more"
 NOT_BETTER = "no model: on the unseen part of the motion it is no better than the simulation, or than its links alone"
 
 
@@ -46,11 +46,13 @@ class MotionPart:
     model: TorquesOfModel | None
 
 
-def reconcile_torques(measured: Recording, simulated: TorquesOfModel | None, name: str) -> MotionPart | None:
-    """None where the recording holds no torques in motion. `simulated` None: the simulation states no masses."""
+def reconcile_torques(
+    measured: Recording, simulated: TorquesOfModel | None, name: str
+) -> MotionPart | ExaminationRecord:
+    """Why the torques are not examined, where they are not. `simulated` None: the simulation states no masses."""
     found = reconcile_motion(measured, simulated, np.random.default_rng(SEED))
-    if found is None:
-        return None
+    if isinstance(found, ExaminationRecord):
+        return found
     joints, why_not = _replayed(measured, found)
     said = found.found.diagnosis
     remains = [f"unexplained at {one.where}: {one.why}" for one in said.unexplained]
@@ -135,13 +137,14 @@ def _says(found: MotionReconciled, *, agree: bool) -> str:
     return f"{how} on the unseen part of the motion with the {causes} found in the part before it."
 
 
-def with_motion(file: ReconcileFile | None, part: MotionPart | None) -> ReconcileFile:
-    """A reconciliation of poses, of a motion, or of both."""
-    if file is None or part is None:
-        alone = file if part is None else part.file
-        if alone is None:
+def with_motion(file: ReconcileFile | None, part: MotionPart | ExaminationRecord) -> ReconcileFile:
+    """A reconciliation of poses, of a motion, or of both. ValueError of neither."""
+    if isinstance(part, ExaminationRecord):
+        if file is None:
             raise ValueError("nothing was reconciled")
-        return alone
+        return file
+    if file is None:
+        return part.file
     more = part.file
     return msgspec.structs.replace(
         file,

@@ -3,7 +3,7 @@
 `compare` takes recordings to one frozen record, the content of compare.json, version 1, as in docs/formats.md.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -25,6 +25,8 @@ from calibrate.compare.comparison_file import (
     size_records,
 )
 from calibrate.compare.difference_explained import Explanation, explain, notes_of
+from calibrate.compare.encoder_zeros import joint_zeros, zero_mismatches_of
+from calibrate.compare.examinations import with_examinations
 from calibrate.compare.fit_to_simulation import Constant
 from calibrate.compare.link_differs import (
     ROUNDING,
@@ -44,6 +46,7 @@ from calibrate.compare.rig_and_streams import (
     rig_mismatches,
     stream_mismatches,
     stream_records,
+    stream_reports,
     zero_mismatches,
 )
 from calibrate.compare.rig_keys import rig_differences
@@ -90,12 +93,15 @@ def compare(
         found += zero_mismatches(zeros_rad)
     found += asked.left
     streams = stream_pairs(devices_of(measured), devices_of(simulated))
-    found += stream_mismatches(measured, simulated, asked.found, streams)
+    reports = stream_reports(measured, simulated, asked.found)
+    found += stream_mismatches(measured, simulated, reports, streams)
+    zeros = joint_zeros(*reports)
+    found += _unseen_in_samples(zero_mismatches_of(zeros), found)
     found.sort(key=lambda one: one.order)
     explained = any(one.decides and one.level not in (Level.RIG, Level.STREAMS) for one in found)
     judged_links = tuple(_as_explained(one, asked, explained, pair[0]) for one in judged_links)
     verdict = _verdict(found, judged_links, asked)
-    return ComparisonFile(
+    file = ComparisonFile(
         1,
         "calibeam-comparison",
         software,
@@ -115,6 +121,13 @@ def compare(
         tuple(notes_of(asked)),
         asked.diagnosis,
     )
+    return with_examinations(file, measured, simulated, zeros)
+
+
+def _unseen_in_samples(zeros: Iterable[Mismatch], found: Sequence[Mismatch]) -> list[Mismatch]:
+    """Zeros of second encoders that the samples have not shown already."""
+    known = {one.where for one in found if one.level is Level.ENCODER_ZEROS}
+    return [one for one in zeros if one.where not in known]
 
 
 def _refuse_wrong(recording: Recording) -> None:
@@ -175,7 +188,7 @@ def _says(verdict: Verdict, found: list[Mismatch], asked: Explanation) -> str:
     deciding = [one for one in found if one.decides]
     anew = "; what is set up again for every recording is taken into account" if len(deciding) < len(found) else ""
     if verdict is Verdict.CONSISTENT:
-        return f"Measured and simulated agree to within the noise at every level{anew}."
+        return f"Measured and simulated agree to within the noise at every level that was examined{anew}."
     if verdict is Verdict.UNDECIDABLE:
         return f"{deciding[0].says if deciding else asked.why}."
     named = [one for one in deciding if one.level is not Level.UNEXPLAINED]

@@ -7,6 +7,7 @@ from enum import Enum
 import msgspec
 import numpy as np
 
+from acquisition.recording.examination import ExaminationRecord
 from calibrate.compare.link_differs import (
     JudgedLink,
 )
@@ -179,6 +180,7 @@ class ComparisonFile(msgspec.Struct, frozen=True):
     notes: tuple[str, ...]
     diagnosis: DiagnosisFile | None
     torques: ComparedTorques | None = None
+    examinations: tuple[ExaminationRecord, ...] = ()
 
 
 def size_records(sizes: Mapping[str, Size]) -> dict[str, SizeRecord]:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from acquisition.recording import Recording, Samples
+from acquisition.recording.examination import ExaminationRecord
 from acquisition.recording.rig import Rig
 from acquisition.recording.samples import ORIENTATION, POSITION, SPOTS, WIRE
 from calibrate.compare.comparison_file import ComparisonFile
@@ -117,6 +118,7 @@ class ReconcileFile(msgspec.Struct, frozen=True):
     notes: tuple[str, ...]
     all_rows: tuple[AllRowsRecord, ...] = ()
     torques: tuple[JointTorquesRecord, ...] = ()  # of a recording in motion
+    examinations: tuple[ExaminationRecord, ...] = ()
 
 
 def split(samples: Samples, seed: int) -> tuple[Ints, Ints]:

@@ -16,6 +16,8 @@ from calibrate.compare.comparison_file import (
     StreamRecord,
     difference_record,
 )
+from calibrate.compare.encoder_zeros import pair_zeros, zero_mismatches_of
+from calibrate.compare.examinations import with_examinations
 from calibrate.compare.fit_to_simulation import SimulationFit
 from calibrate.compare.link_differs import JudgedLink
 from calibrate.compare.rig_keys import RigKey, rig_differences
@@ -31,7 +33,7 @@ from calibrate.compare.streams import (
 )
 from calibrate.diagnose.assess import Verdict
 from calibrate.diagnose.state import Fitted
-from calibrate.diagnose.streams import devices_of, streams_of
+from calibrate.diagnose.streams import StreamReport, devices_of, streams_of
 from calibrate.errors import DataError
 from calibrate.model.effects.term import Size, plain
 from calibrate.quantities import angle, length
@@ -94,19 +96,23 @@ def zero_mismatches(zeros_rad: Floats) -> Iterator[Mismatch]:
         yield Mismatch(Level.JOINT_ZEROS, f"joint{j + 1}.angle", "joint-zero-moved", size, says)
 
 
-def stream_mismatches(
-    measured: Recording, simulated: Recording, found: SimulationFit | None, pairs: tuple[StreamPair, ...]
-) -> list[Mismatch]:
-    """Of streams that both have: what each recording shows by itself, side by side, and what one motion shows.
+Reports = tuple[StreamReport | None, StreamReport | None]
 
-    `found`: what a search gave, None where none was made.
-    """
-    if not measured.streams or not simulated.streams:
-        return []
+
+def stream_reports(measured: Recording, simulated: Recording, found: SimulationFit | None) -> Reports:
+    """What each recording's streams show. `found`: what a search gave, None where none was made."""
     models: tuple[Fitted | None, Fitted | None] = (None, None)
     if found is not None and found.diagnosed.physics is not None:
         models = found.diagnosed.physics.model, found.simulated.fitted
-    reports = [streams_of(one, model) for one, model in zip((measured, simulated), models, strict=True)]
+    return streams_of(measured, models[0]), streams_of(simulated, models[1])
+
+
+def stream_mismatches(
+    measured: Recording, simulated: Recording, reports: Reports, pairs: tuple[StreamPair, ...]
+) -> list[Mismatch]:
+    """Of streams that both have: what each recording shows by itself, side by side, and what one motion shows."""
+    if not measured.streams or not simulated.streams:
+        return []
     apart = stream_differences(reports[0], reports[1])
     out = [_of_stream(one) for one in apart]
     late = {one.stream for one in apart if one.name.physics == LATENCY}
@@ -195,10 +201,12 @@ def compare_logs(measured: Recording, simulated: Recording, software: str) -> Co
             "give logs of the same encoders"
         )
     pair = stream_pair(ZEROLESS, one, two)
-    found = stream_mismatches(measured, simulated, None, (pair,))
+    zeros = pair_zeros(one, two)
+    found = stream_mismatches(measured, simulated, stream_reports(measured, simulated, None), (pair,))
+    found += zero_mismatches_of(zeros)
     records = tuple(difference_record(one, None) for one in found)
     verdict, says = _verdict_of_logs(found, pair)
-    return ComparisonFile(
+    file = ComparisonFile(
         1,
         "calibeam-comparison",
         software,
@@ -219,6 +227,7 @@ def compare_logs(measured: Recording, simulated: Recording, software: str) -> Co
         (),
         None,
     )
+    return with_examinations(file, measured, simulated, zeros)
 
 
 def _verdict_of_logs(found: list[Mismatch], pair: StreamPair) -> tuple[Verdict, str]:
@@ -226,5 +235,5 @@ def _verdict_of_logs(found: list[Mismatch], pair: StreamPair) -> tuple[Verdict, 
         return Verdict.MISMATCH, "The two logs differ."
     if pair.parts is None:
         why = f"the two logs do not show one motion ({pair.clock.status.value})"
-        return Verdict.UNDECIDABLE, f"Nothing can be compared: {why}."
+        return Verdict.UNDECIDABLE, f"The motions cannot be compared: {why}."
     return Verdict.CONSISTENT, "The encoders read the same in both logs to within the noise."

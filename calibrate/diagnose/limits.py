@@ -25,6 +25,8 @@ FEWEST_SAMPLES = 16
 # curve or two more leave next to no residual that would show the noise
 FEWEST_FOR_NAMES = 20
 FEWEST_LEFT = 12  # numbers that geometry leaves free, where samples are fewer than `FEWEST_FOR_NAMES`
+# rows, 400 positions, of poses that a search works on: an effect of a quarter of the noise is plain to see in so many
+MOST_SEARCH_ROWS = 1200
 # share of the reach; where half of the readings are farther off the fitted arm, the rig file describes another arm: no
 # physics moves an arm so far
 FAR_OF_REACH = 0.02

@@ -38,6 +38,7 @@ FOLDS = 5
 FARTHEST = 1e3  # m and rad: no pose of an arm, nor is what is no number
 OUTLYING = 6.0  # sigma (of the median): a pose that was written at another time than its angles
 AXES = ("x", "y", "z", "rx", "ry", "rz")
+FLAT = 1e-9  # of an axis in another one
 SAME_M = 1e-6  # of a tool's point: rounded in a table
 PARTS = ("tool", "base", "zeros", "links")
 POSES = (("actual_tcp_pose_m_rad",), ("controller_position_m", "controller_rotation_rad"))  # the second of an import
@@ -76,6 +77,14 @@ class ControllerPoses:
             return None
         rows = np.flatnonzero(known)[np.unique(np.linspace(0, int(known.sum()) - 1, MOST).astype(int))]
         return cls(samples.joints()[rows], _transforms(pose[rows]), None, "samples")
+
+    @classmethod
+    def recorded(cls, recording: Recording) -> bool:
+        """Whether the recording has channels or columns for such poses, whatever stands in them."""
+        channels = [stream.values for stream in recording.streams.values()]
+        return any(all(c in values for c in names) for values in channels for names in POSES) or all(
+            name in recording.samples.columns for name in CONTROLLER
+        )
 
     @classmethod
     def joined(cls, several: "Sequence[ControllerPoses]") -> "ControllerPoses | None":
@@ -133,6 +142,9 @@ class ControllerArm:
     theta: dict[str, float]  # corrections of the arm by name
     T_base: Floats  # (4, 4) of the rig file's base in the controller's
     T_flange_tool: Floats  # (4, 4)
+    tool_sigma: (
+        Floats | None
+    )  # (6,) of its point (m) and turn (rad), axes of the flange; inf: not determined; None: stated
     poses: int
     left_out: int
     left_m: float  # rms of a coordinate
@@ -209,15 +221,16 @@ class _Fit:
             out[fold == k] = np.sum(replace(self, poses=self.poses.rows(fold == k)).residual(there) ** 2, axis=1)
         return np.maximum(out, sum((ROUNDING / size) ** 2 for size in self.sizes))
 
-    def sigmas(self, at: _State, parts: Sequence[str]) -> Floats:
-        """(column,) of the estimates, by what each pose leaves: its six numbers may err together.
+    def covariance(self, at: _State, parts: Sequence[str]) -> Floats:
+        """(column, column) of the estimates, by what each pose leaves: its six numbers may err together.
 
         Source: H. White, A heteroskedasticity-consistent covariance matrix estimator, Econometrica 48 (1980) 817.
         """
         J, r = self.jacobian(at, parts), self.residual(at)
         scale = np.array([p.plausible for p in self.columns(parts)])
         whole = np.linalg.pinv((J * scale).reshape(-1, len(scale)), rcond=1e-10).reshape(len(scale), len(r), 6)
-        return scale * np.sqrt(np.sum(np.einsum("kni,ni->kn", whole, r) ** 2, axis=1))
+        pulls = scale[:, None] * np.einsum("kni,ni->kn", whole, r)
+        return pulls @ pulls.T
 
     def solved(self, parts: Sequence[str], start: _State) -> _State:
         at, columns = start, self.columns(parts)
@@ -307,17 +320,16 @@ def _stated(rig: Rig, fit: _Fit, at: _State, parts: tuple[str, ...], left_out: i
     theta = dict(zip(names, at.theta.tolist(), strict=True))
     base = np.concatenate([at.base[:3, 3], Rotation.from_matrix(at.base[:3, :3]).as_rotvec()])
     value = theta | {f"base.{axis}": v for axis, v in zip(AXES, base.tolist(), strict=True)}
-    differences, undetermined = list[ArmDifference](), list[str]()
+    differences, undetermined, tool_sigma = list[ArmDifference](), list[str](), None
     if columns:
         seen = analyse(fit.jacobian(at, parts).reshape(-1, len(columns)), columns)
         limit = float(-ndtri(0.5 * LEVEL / len(columns)))
-        sigmas = np.maximum(seen.sigma, fit.sigmas(at, parts))
+        sigmas = np.maximum(seen.sigma, np.sqrt(np.diag(fit.covariance(at, parts))))
+        tool_sigma = _tool_sigma(at, columns, np.maximum(sigmas, ROUNDING))
         for p, sigma in zip(columns, sigmas.tolist(), strict=True):
-            if p.name.startswith("tool."):
-                continue
             if not np.isfinite(sigma):
                 undetermined.append(f"{p.name}: {seen.reason(p.name)}")
-            elif abs(value[p.name]) > max(limit * sigma, ROUNDING * 10.0):
+            elif not p.name.startswith("tool.") and abs(value[p.name]) > max(limit * sigma, ROUNDING * 10.0):
                 differences.append(ArmDifference(p.name, p.unit, value[p.name], sigma))
     stated = fit.poses.T_flange_tool
     tool = at.tool if stated is None else at.tool @ stated[-1]
@@ -333,12 +345,26 @@ def _stated(rig: Rig, fit: _Fit, at: _State, parts: tuple[str, ...], left_out: i
         theta,
         at.base,
         tool,
+        tool_sigma,
         len(left),
         left_out,
         m,
         rad,
         source,
     )
+
+
+def _tool_sigma(at: _State, columns: Sequence[Parameter], sigmas: Floats) -> Floats | None:
+    """(6,) along and about the axes of the flange; a motion of the tool is fitted in its own. None without a fit."""
+    by_name = dict(zip((p.name for p in columns), sigmas.tolist(), strict=True))
+    own = [by_name.get(f"tool.{axis}") for axis in AXES]
+    if None in own:
+        return None
+    turn = np.abs(at.tool[:3, :3])
+    turn[turn < FLAT] = 0.0
+    with np.errstate(invalid="ignore"):  # an axis that takes no part in one that is not determined
+        parts = np.array(own, dtype=float).reshape(2, 1, 3) * turn[None]
+    return np.sqrt(np.nansum(parts**2, axis=2)).ravel()
 
 
 def _differs(rig: Rig, tool: Floats, sigma_m: float) -> bool:

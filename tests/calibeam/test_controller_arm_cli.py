@@ -73,7 +73,10 @@ def test_another_tool_is_information(recorded, capsys):
     path, _ = recorded(controller(), TOOL)
     (found,) = findings(path, capsys)
     assert found["severity"] == "information"
-    assert "the arm of the rig file, but with another tool: its tool is at 0.000, 0.000, 120.000 mm" in found["says"]
+    assert (
+        "the arm of the rig file, but with another tool: its tool is stated by it at 0.000, 0.000, 120.000 mm"
+        in found["says"]
+    )
     assert controller_notes(read(path)) == ()
 
 

@@ -111,6 +111,7 @@ class Joint(Struct, frozen=True, forbid_unknown_fields=True):
     torque_per_ampere: Positive | None = None  # Nm at the joint, ratio of the gear included
     encoder_counts: Identity | None = None
     encoder_side: EncoderSide | None = None  # of the second encoder; None: not known
+    encoder_zero_rad: Radians | None = None  # reading of the second encoder where this joint reads 0; None: not known
     mass_kg: Kilograms | None = None
     com_m: ArmVector | None = None
     inertia_kg_m2: Inertia | None = None  # xx, yy, zz, xy, xz, yz about the centre of mass, in the axes of the link

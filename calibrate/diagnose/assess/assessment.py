@@ -292,15 +292,18 @@ def _unseen_squares(basis: Floats, residual: Floats, folds: Sequence[Ints], geom
         # (I - Q Q')^-1 r = r + Q (I - Q' Q)^-1 Q' r: a fold has more rows than the model has directions.
         Q = basis[fold]
         error = residual[fold] + Q @ np.linalg.solve((1.0 + RIDGE) * np.eye(p) - Q.T @ Q, Q.T @ residual[fold])
-        U, s, _ = np.linalg.svd(geometry[fold], full_matrices=False)
-        out[fold] = (error - U @ ((1.0 - np.sqrt(np.maximum(1.0 - s**2, 0.0))) * (U.T @ error))) ** 2
+        # With G = U s V': U (1 - sqrt(1 - s^2)) U' = G V / (1 + sqrt(1 - s^2)) V' G'. The eigenvalues of G' G are s^2;
+        # unlike the singular values of G they converge where columns are zero or next to it.
+        G = geometry[fold]
+        square, V = np.linalg.eigh(G.T @ G)
+        out[fold] = (error - G @ (V @ (V.T @ (G.T @ error) / (1.0 + np.sqrt(np.maximum(1.0 - square, 0.0)))))) ** 2
     return out
 
 
 def thinned(state: State, rng: Generator) -> State:
     """The state itself, or fitted to samples drawn at random; repeats stay together."""
     samples = np.unique(state.rows.sample[state.rows.data])
-    most = limits.MOST_ROWS * len(samples) // max(int(state.rows.data.sum()), 1)
+    most = state.most_search_rows * len(samples) // max(int(state.rows.data.sum()), 1)
     if len(samples) <= most:
         return state
     label = units(state.drivers)[samples]

@@ -70,8 +70,6 @@ NOISE_FLOOR_DOF = 20  # degrees of freedom of repeats, for a noise floor
 WORKSPACE_POSES = 300  # poses at which the tool error over the workspace changes
 # measured poses, copies counted, for each new one: what is chosen by the poses stays as it was to 1 %
 POSES_FOR_ONE_NEW = 100.0
-# rows, 400 positions, that a search works on: an effect of a quarter of the noise is plain to see in so many
-MOST_ROWS = 1200
 
 # The noise that the rig file states
 MORE_THAN_STATED = 1.5  # factor; a statement is not more exact than that

@@ -16,10 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.recording import Recording
+from acquisition.recording.examination import ExaminationRecord
+from calibrate.diagnose.record.schema import TORQUES_IN_MOTION
 from calibrate.diagnose.streams import StreamDevice, Track, devices_of
-from calibrate.diagnose.streams.recorded import start_between
+from calibrate.diagnose.streams.recorded import CURRENT, JOINT_TORQUE, MOTOR_TORQUE, start_between
 from calibrate.diagnose.streams.track import SIGMA_OF_MEDIAN
-from calibrate.model.arms.coupled_readings import by_reading
 from calibrate.model.effects.torque import Samples
 
 Floats = NDArray[np.float64]
@@ -37,6 +38,12 @@ STAND_PERIODS = 1.25  # and before and after it stands: what friction is there n
 STILL_SHARE = 0.02  # of a joint's greatest speed; below it is taken to stand
 STILL_SIGMAS = 4.0
 TEMPERATURE = "joint_temperature_degC"
+COUPLED = "settled poses and streams of this arm are examined; its torques are not yet"
+LONGER = "record 20 s and more of motion with angles and torques in every row (docs/motion-recordings.md)"
+ANGLES = "record angles and torques of all joints in one stream, or with stamps of one host"
+PER_AMPERE = "state `torque_per_ampere` of the joints in the rig file"
+RATIO = "state `gear_ratio` of the joints in the rig file"
+MOVE = "move every joint faster, and for longer"
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,28 +84,35 @@ class Filtered:
     period_s: float
 
 
-def motion_of(recording: Recording) -> Motion | None:
-    """None without joint angles and torques of one and the same time, or where they are too few; and of an arm with a
-    joint that follows another one: the torques of such drives are shared out between two joints.
-    """
-    made = None if by_reading(recording.rig.arm) is not None else filtered_of(recording)
-    return None if made is None or not made.runs else _thinned(made.runs, recording, made.band_hz, made.period_s)
+def motion_of(recording: Recording) -> Motion | ExaminationRecord:
+    """The moments of a motion, or why the torques of this recording are not examined."""
+    follows = [i + 1 for i, joint in enumerate(recording.rig.arm.joints) if joint.follows is not None]
+    made = filtered_of(recording)
+    if isinstance(made, ExaminationRecord):
+        return made
+    if follows:
+        which = ", ".join(f"joint {i}" for i in follows)
+        return _left_out(f"{which} follows another joint, and the torques of coupled drives are not modelled", COUPLED)
+    if not made.runs:
+        return _left_out(f"no stretch of {LEAST_RUN_S:g} s and more in which angles and torques are all there", LONGER)
+    return _thinned(made.runs, recording, made.band_hz, made.period_s)
 
 
-def filtered_of(recording: Recording) -> Filtered | None:
-    """None without joint angles and torques of one and the same time."""
-    devices = devices_of(recording)
+def filtered_of(recording: Recording) -> Filtered | ExaminationRecord:
+    """Every stretch behind the low pass, or why there is none."""
+    devices, n = devices_of(recording), recording.rig.n_joints
     joints, torque = devices.get("joints"), devices.get("torque")
-    n = recording.rig.n_joints
-    if joints is None or torque is None or joints.track.channels != n or n == 0:
-        return None
+    if torque is None:
+        return _without_torque(recording)
+    if joints is None or joints.track.channels != n or n == 0:
+        return _left_out("torques were recorded without the angles of all joints", ANGLES)
     period_s = joints.track.period_s
     if not np.isfinite(period_s) or period_s <= 0.0:
-        return None
+        return _left_out("the time stamps of the angles do not rise", ANGLES)
     band_hz = min(BAND_HZ, 1.0 / period_s / RATE_OVER_BAND)
     torques = _on_clock_of(joints, torque)
     if torques is None:
-        return None
+        return _left_out("nothing shows how the clocks of angles and torques differ", ANGLES)
     there = np.full(n, -1)
     there[[torques.joint(k) - 1 for k in range(torques.channels)]] = np.arange(torques.channels)
     first = max(joints.track.time_s[0], torques.time_s[0])
@@ -110,6 +124,22 @@ def filtered_of(recording: Recording) -> Filtered | None:
         _filtered(time_s[run], q_rad[run], torque_nm[run], band_hz, period_s) for run in _runs(whole, band_hz, period_s)
     ]
     return Filtered(runs, band_hz, period_s)
+
+
+def _left_out(reason: str, remedy: str, *, expected: bool = True) -> ExaminationRecord:
+    return TORQUES_IN_MOTION.not_examined(reason, remedy=remedy, expected=expected)
+
+
+def _without_torque(recording: Recording) -> ExaminationRecord:
+    """What is recorded in the place of torques decides whether they could be had."""
+    channels = {name for stream in recording.streams.values() for name in stream.values}
+    if CURRENT in channels:
+        return _left_out("motor currents were recorded, but no torque per ampere is stated", PER_AMPERE)
+    if MOTOR_TORQUE in channels:
+        return _left_out("motor torques were recorded, but no gear ratio is stated", RATIO)
+    return _left_out(
+        "no torques of the joints were recorded", TORQUES_IN_MOTION.remedy, expected=JOINT_TORQUE in channels
+    )
 
 
 def planned_motion(time_s: Floats, q: Floats, qd: Floats, qdd: Floats, jerk: Floats) -> Motion:
@@ -186,7 +216,7 @@ def _sections(share_of_nyquist: float) -> Floats:
     return np.asarray(butter(ORDER, share_of_nyquist, output="sos"))
 
 
-def _thinned(runs: list[Run], recording: Recording, band_hz: float, period_s: float) -> Motion | None:
+def _thinned(runs: list[Run], recording: Recording, band_hz: float, period_s: float) -> Motion | ExaminationRecord:
     speed, acceleration = _gains(band_hz, period_s)
     noise = np.max([run.noise_rad for run in runs], axis=0)
     fastest = np.max([np.abs(run.qd_rad_s).max(axis=0) for run in runs], axis=0)
@@ -194,8 +224,10 @@ def _thinned(runs: list[Run], recording: Recording, band_hz: float, period_s: fl
     step = max(1, round(0.5 / band_hz / period_s), -(-sum(len(run.time_s) for run in runs) // MOST_ROWS))
     parts = [_rows(run, still, 1.0 / band_hz / period_s, step) for run in runs]
     time_s, q, qd, qdd, jerk, torque = (np.concatenate(each) for each in zip(*parts, strict=True))
-    if len(time_s) < FEWEST_ROWS or not np.isfinite(torque).any():
-        return None
+    if len(time_s) < FEWEST_ROWS:
+        return _left_out(f"only {len(time_s)} moments of motion, of {FEWEST_ROWS} at least", LONGER)
+    if not np.isfinite(torque).any():
+        return _left_out("no joint moves for long enough to show its torque", MOVE)
     heat = _temperatures(recording, time_s, q.shape[1])
     samples = _samples(runs, step, lambda values: _low_pass(values, band_hz, period_s))
     sigmas = speed * noise, acceleration * noise

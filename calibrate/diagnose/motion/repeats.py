@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.recording import Recording
+from acquisition.recording.examination import ExaminationRecord
 from acquisition.recording.motion_plan import MOTION_EVENT
 from calibrate.diagnose.motion.motion_table import STILL_SHARE, Run, filtered_of
 from calibrate.diagnose.streams import devices_of
@@ -38,7 +39,7 @@ def scatter_of_repeats(recording: Recording) -> RepeatScatter | None:
     """None where no motion was finished, no torques were recorded, or fewer than two repeats are alike."""
     event = next((one for one in recording.events if one.kind == MOTION_EVENT), None)
     made, joints = filtered_of(recording), devices_of(recording).get("joints")
-    if event is None or made is None or joints is None:
+    if event is None or isinstance(made, ExaminationRecord) or joints is None:
         return None
     length_s, repeats = float(event.detail["length_s"]), int(event.detail["repeats"])
     motion_s, host_s = np.array(event.detail["motion_s"]), np.array(event.detail["host_s"])

@@ -66,6 +66,11 @@ class TorqueState:
         return len(self.active)
 
     @property
+    def most_search_rows(self) -> int:
+        """All of them: the moments are thinned evenly when the motion is read, and their noise has a memory."""
+        return len(self.problem.moment)
+
+    @property
     def distrusted(self) -> int:
         return int(np.sum(self.problem.weights < limits.DISTRUSTED_WEIGHT))
 

@@ -4,7 +4,7 @@ in diagnosis.json.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from msgspec import structs
@@ -12,21 +12,26 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 
 from acquisition.recording import Recording
+from acquisition.recording.examination import ExaminationRecord
 from acquisition.recording.rig import Rig
-from calibrate.diagnose.assess.diagnosis import Diagnosis, Verdict
+from calibrate.diagnose.assess import limits
+from calibrate.diagnose.assess.diagnosis import Diagnosis, Finding, Verdict
 from calibrate.diagnose.diagnose import diagnose
 from calibrate.diagnose.motion.links_alone import torque_state
 from calibrate.diagnose.motion.motion_table import Motion, motion_of
 from calibrate.diagnose.motion.torque_state import TorqueState
 from calibrate.diagnose.record.schema import (
     TORQUE,
+    TORQUES_IN_MOTION,
     ChangedRecord,
     DiagnosisFile,
     FindingRecord,
+    IncompleteRecord,
     JointTorqueRecord,
     TorquesRecord,
 )
 from calibrate.diagnose.record.to_file import finding_record, unexplained_record
+from calibrate.diagnose.stages import DECIDING, Stage
 from calibrate.model.effect_records import EffectRecord
 from calibrate.model.effects.term import Accepted, Missing
 from calibrate.model.effects.torque import TORQUES, friction
@@ -56,21 +61,37 @@ class TorqueDiagnosis:
 
 def diagnose_torques(
     recording: Recording, rng: Generator, known: TorquesOfModel | None = None
-) -> TorqueDiagnosis | None:
+) -> TorqueDiagnosis | ExaminationRecord:
     """What differs from the links that the rig file states, or from a model or simulation that is `known`.
 
-    None where the recording holds no torques beside joint angles, or too few of them in motion; and of an arm with a
-    joint that follows another one.
+    The record states why the torques of the recording are not examined.
     """
     motion = motion_of(recording)
-    return None if motion is None else diagnose_motion(recording.rig, motion, rng, known)
+    return motion if isinstance(motion, ExaminationRecord) else diagnose_motion(recording.rig, motion, rng, known)
 
 
 def diagnose_motion(rig: Rig, motion: Motion, rng: Generator, known: TorquesOfModel | None = None) -> TorqueDiagnosis:
     """The same of moments of a motion."""
     bare = torque_state(rig, motion, known)
     missing: tuple[Missing, ...] = tuple(m for kind in TORQUES for m in kind.missing(bare.drivers))
-    return TorqueDiagnosis(motion, diagnose(bare, rng, missing, usual=usual_friction(bare)), bare, known)
+    found = diagnose(bare, rng, missing, usual=usual_friction(bare))
+    return TorqueDiagnosis(motion, found if known is None else _certain_changes(found, known), bare, known)
+
+
+def _certain_changes(found: Diagnosis, known: TorquesOfModel) -> Diagnosis:
+    """Without changes that the uncertainty of the known effects at their place may be: these entered as exact."""
+
+    def is_certain(finding: Finding) -> bool:
+        name, size = next(iter(finding.parameters.items()))
+        unit = name.partition("_")[2]
+        own = [e.parameters for e in known.effects if e.where == finding.name.where]
+        sigmas = [s.sigma or 0.0 for p in own for n, s in p.items() if n.partition("_")[2] == unit]
+        return abs(size.value) > limits.SIZE_SIGMAS * float(np.hypot(size.sigma, max(sigmas, default=0.0)))
+
+    findings = tuple(filter(is_certain, found.findings))
+    nothing = not findings and found.verdict is Verdict.MISMATCH
+    left = Verdict.UNDECIDABLE if found.unexplained else Verdict.CONSISTENT
+    return replace(found, findings=findings, verdict=left if nothing else found.verdict)
 
 
 def usual_friction(bare: TorqueState) -> tuple[Accepted, ...]:
@@ -81,10 +102,29 @@ def usual_friction(bare: TorqueState) -> tuple[Accepted, ...]:
     return tuple(Accepted(term, np.zeros(1), np.zeros(0)) for term in terms)
 
 
-def with_torques(file: DiagnosisFile, found: TorqueDiagnosis | None) -> DiagnosisFile:
+def _examination(found: TorqueDiagnosis | ExaminationRecord) -> ExaminationRecord:
+    """How the examination of the torques ended."""
+    if isinstance(found, ExaminationRecord):
+        return found
+    said = found.diagnosis
+    deciding = [one for one in said.incomplete if one.stage in DECIDING]
+    if said.findings or said.unexplained:
+        return TORQUES_IN_MOTION.found(
+            "; ".join((*(f.says for f in said.findings), *(u.why for u in said.unexplained)))
+        )
+    if deciding:
+        failed = "; ".join(f"{one.stage.value}: {one.reason}" for one in deciding)
+        return TORQUES_IN_MOTION.not_examined(f"a stage failed: {failed}", remedy="report the recording as a fault")
+    return TORQUES_IN_MOTION.nothing(float(found.model.noise_nm.max()), "Nm")
+
+
+def with_torques(file: DiagnosisFile, found: TorqueDiagnosis | ExaminationRecord) -> DiagnosisFile:
     """The diagnosis with what the torques show; findings of samples and streams stay in front."""
-    if found is None:
-        return file
+    examined = structs.replace(file, examinations=(*file.examinations, _examination(found)))
+    return examined if isinstance(found, ExaminationRecord) else _with_findings(examined, found)
+
+
+def _with_findings(file: DiagnosisFile, found: TorqueDiagnosis) -> DiagnosisFile:
     said = found.diagnosis
     findings = tuple(structs.replace(finding_record(one, None), stream=TORQUE, curve=None) for one in said.findings)
     changed = () if found.known is None else tuple(c for one in findings for c in _changed(one, found.known.effects))
@@ -101,10 +141,16 @@ def with_torques(file: DiagnosisFile, found: TorqueDiagnosis | None) -> Diagnosi
         also_unexplained=(*file.also_unexplained, *(one for one in left if one is not first)),
         next=(*_to_record(said), *file.next),
         changed=(*file.changed, *changed),
+        incomplete=(*file.incomplete, *_not_completed(said)),
         torques=TorquesRecord(
             found.motion.made, tuple(_joints(found)), "" if found.known is None else found.known.source
         ),
     )
+
+
+def _not_completed(said: Diagnosis) -> tuple[IncompleteRecord, ...]:
+    """Stages of the torques beside those of the poses, which have the same names."""
+    return tuple(IncompleteRecord(f"{Stage.TORQUES.value}, {one.stage.value}", one.reason) for one in said.incomplete)
 
 
 def _changed(finding: FindingRecord, effects: Sequence[EffectRecord]) -> tuple[ChangedRecord, ...]:

@@ -8,6 +8,7 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 
 from acquisition.recording import Recording
+from acquisition.recording.examination import ExaminationRecord
 from calibrate.diagnose.motion.links_alone import expected_nm
 from calibrate.diagnose.motion.motion_table import Motion, motion_of
 from calibrate.diagnose.motion.to_model import torques_of_model, torques_of_state
@@ -68,11 +69,13 @@ def _over_noise(joints: tuple[JointTorquesRecord, ...], left_nm: list[float]) ->
     return float(np.mean([(left / one.noise_nm) ** 2 for one, left in zip(joints, left_nm, strict=True)]))
 
 
-def reconcile_motion(recording: Recording, simulated: TorquesOfModel | None, rng: Generator) -> MotionReconciled | None:
-    """None where the recording holds no torques beside joint angles, or too few of them in motion."""
+def reconcile_motion(
+    recording: Recording, simulated: TorquesOfModel | None, rng: Generator
+) -> MotionReconciled | ExaminationRecord:
+    """Why the torques of the recording are not examined, where they are not."""
     motion = motion_of(recording)
-    if motion is None:
-        return None
+    if isinstance(motion, ExaminationRecord):
+        return motion
     seen, unseen = motion_in_two(motion)
     if not np.isfinite(unseen.torque_nm).any():
         raise DataError(f"{recording.path}: no joint moves in the last part of the motion, by which a model is judged")

@@ -4,6 +4,7 @@ from typing import Literal
 
 import msgspec
 
+from acquisition.recording.examination import Examination, ExaminationRecord
 from acquisition.recording.files.bounds import Count, Label, Many, Name, Number, Sentence, Statistic, Whole
 
 SCHEMA = 1
@@ -95,6 +96,11 @@ class StreamsRecord(Record, frozen=True):
 
 
 TORQUE = "torque"  # the `stream` of findings in torques
+TORQUES_IN_MOTION = Examination(
+    "torques in motion",
+    ("q", "tau"),
+    "record torques (tau, motor_tau) or currents beside the angles of all joints in motion",
+)
 
 
 class JointTorqueRecord(Record, frozen=True):
@@ -278,6 +284,7 @@ class DiagnosisFile(Record, frozen=True):
     incomplete: Many[IncompleteRecord] = ()  # what could not be looked at, and why
     noise: Many[NoiseRecord] = ()
     torques: TorquesRecord | None = None  # of a recording in motion
+    examinations: Many[ExaminationRecord] = ()  # how each of them ended; of earlier files none is known
 
 
 def of_poses(file: DiagnosisFile) -> tuple[FindingRecord, ...]:

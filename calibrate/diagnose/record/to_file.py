@@ -4,6 +4,7 @@ import math
 from importlib.metadata import version
 
 import numpy as np
+from msgspec import structs
 from numpy.typing import NDArray
 
 from acquisition.recording import Recording
@@ -23,6 +24,7 @@ from calibrate.diagnose.assess.findings import named
 from calibrate.diagnose.assess.stated_noise import NoiseFound
 from calibrate.diagnose.assess.unseen_rows import Floor, HeldOutProof
 from calibrate.diagnose.from_recording import Diagnosed, Physics
+from calibrate.diagnose.record.pose_examinations import pose_examinations
 from calibrate.diagnose.record.schema import (
     SCHEMA,
     CurveRecord,
@@ -61,7 +63,12 @@ ANGULAR = ("angle", "tilt", "twist", "direction")
 
 
 def file_of(diagnosed: Diagnosed, recording: Recording) -> DiagnosisFile:
-    """The record to write."""
+    """The record to write, with how the examinations of the samples ended."""
+    file = _file(diagnosed, recording)
+    return structs.replace(file, examinations=pose_examinations(file))
+
+
+def _file(diagnosed: Diagnosed, recording: Recording) -> DiagnosisFile:
     rig = RigRecord(recording.rig.name, rig_sha256(recording.rig_text))
     gross_errors = tuple(map(_gross_error, diagnosed.blunders))
     if diagnosed.physics is None:

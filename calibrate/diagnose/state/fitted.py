@@ -100,6 +100,10 @@ class Fitted:
         return len(self.active)
 
     @property
+    def most_search_rows(self) -> int:
+        return limits.MOST_SEARCH_ROWS
+
+    @property
     def distrusted(self) -> int:
         return sum(int(np.sum(s.weights < limits.DISTRUSTED_WEIGHT)) for s in self.scatters)
 

@@ -81,6 +81,11 @@ class State(Protocol):
     def samples(self) -> int: ...
 
     @property
+    def most_search_rows(self) -> int:
+        """Data rows that a search works on at most; of more, samples are drawn."""
+        ...
+
+    @property
     def distrusted(self) -> int:
         """Observations that robust weights have all but taken out."""
         ...

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibrate.diagnose.streams.clock import fit
+from calibrate.diagnose.streams.limits import USUAL_DISC_RAD
 from calibrate.diagnose.streams.recorded import StreamDevice
 from calibrate.diagnose.streams.slips import Slip, steps_in
 from calibrate.diagnose.streams.track import white_noise
@@ -43,6 +44,7 @@ class EncoderPair:
     noise_rad: float | None = None
     slips: tuple[Slip, ...] = ()
     why: str = ""
+    level_rad: Size | None = None  # encoder `number` less encoder 1 in its own sense, modulo a turn
 
 
 @dataclass(frozen=True)
@@ -84,11 +86,10 @@ def _pair(device: StreamDevice, k: int) -> EncoderPair:
         return EncoderPair(
             k + 1, why=f"it does not follow encoder 1 one to one (they differ by {np.std(d):.3g} rad rms)"
         )
-    turned = float(np.ptp(q))
+    turned, level = float(np.ptp(q)), _level(other - sense * q, USUAL_DISC_RAD)
     if turned < TURN_RAD:
-        return EncoderPair(
-            k + 1, noise_rad=noise, why=f"eccentricity: the shaft turns through {np.degrees(turned):.0f}°, not 360°"
-        )
+        why = f"eccentricity: the shaft turns through {np.degrees(turned):.0f}°, not 360°"
+        return EncoderPair(k + 1, noise_rad=noise, why=why, level_rad=level)
     X = np.stack([np.ones(len(q)), np.cos(q), np.sin(q), np.cos(2.0 * q), np.sin(2.0 * q), t - t.mean()], axis=1)
     slips = _steps(k + 1, t, d, X, device.track.channels)
     stepped = np.column_stack([X, *((t >= slip.to_s).astype(float) for slip in slips)])
@@ -96,12 +97,19 @@ def _pair(device: StreamDevice, k: int) -> EncoderPair:
     block = np.minimum(np.arange(len(t)) * BLOCKS // len(t), BLOCKS - 1)
     found = fit(stepped[apart], d[apart], block[apart])
     if found is None:
-        return EncoderPair(k + 1, noise_rad=noise, slips=slips, why="eccentricity: the motion does not show it")
+        why = "eccentricity: the motion does not show it"
+        return EncoderPair(k + 1, noise_rad=noise, slips=slips, why=why, level_rad=None if slips else level)
     a, b = found.values[1:3]
     size = float(np.hypot(a, b))
     along = np.array([a, b]) / max(size, 1e-300)
     sigma = float(np.sqrt(along @ found.covariance[1:3, 1:3] @ along))
-    return EncoderPair(k + 1, Size(size, sigma), noise, slips)
+    level = _level(other - sense * q - found.values[1] * np.cos(q) - found.values[2] * np.sin(q), found.sigma[0])
+    return EncoderPair(k + 1, Size(size, sigma), noise, slips, level_rad=None if slips else level)
+
+
+def _level(difference: Floats, sigma_rad: float) -> Size:
+    """Its middle on the circle."""
+    return Size(float(np.angle(np.mean(np.exp(1j * difference)))), float(sigma_rad))
 
 
 def _steps(number: int, t: Floats, d: Floats, X: Floats, encoders: int) -> tuple[Slip, ...]:

@@ -1,35 +1,38 @@
 """Every finder over the streams of one recording: what is wrong with them, where, how much, and what is not found."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from acquisition.recording.examination import ExaminationRecord, not_examined
 from calibrate.diagnose.streams import limits
+from calibrate.diagnose.streams.angle_offsets import AngleOffset, GravityLevers, angle_offsets
 from calibrate.diagnose.streams.clock import ClockFit, ClockStatus, clock_between
 from calibrate.diagnose.streams.clock_faults import judged, lateness, shares_host_clock
 from calibrate.diagnose.streams.coarse_clock import Ticks
 from calibrate.diagnose.streams.continuity import Fault, breaks
 from calibrate.diagnose.streams.deflection import Deflection, deflections
+from calibrate.diagnose.streams.examinations import Seen, stream_examinations
 from calibrate.diagnose.streams.following import Following, following
 from calibrate.diagnose.streams.recorded import StreamDevice, by_host, start_between
 from calibrate.diagnose.streams.ringing import Levers, ringing
 from calibrate.diagnose.streams.settling import Stand, Window, stands_of, unsettled
-from calibrate.diagnose.streams.slips import Causes, slips
+from calibrate.diagnose.streams.slips import Causes, Slips, slips
 from calibrate.diagnose.streams.stream_findings import (
     StreamFinding,
     break_findings,
     deflection_finding,
     following_finding,
     late_finding,
+    offset_findings,
     reading_lag_finding,
     ringing_finding,
     slip_finding,
     unsettled_finding,
 )
 from calibrate.diagnose.streams.track import SIGMA_OF_MEDIAN, Outcome, Track
-from calibrate.model.effects.term import with_sigma
 
 Floats = NDArray[np.float64]
 Predicted = Callable[[Floats, Floats], Floats]  # (row, joint) rad and (row,) joints' clock -> (row, 4) spots, NaN: none
@@ -39,13 +42,20 @@ NUDGE_RAD = 1e-5  # of a joint, for its lever on the spots: far below what bends
 
 @dataclass(frozen=True, eq=False)
 class StreamReport:
-    """`clocks`: other device -> its clock against the joints' one. `unseen`: in words, what this motion cannot show."""
+    """`clocks`: other device -> its clock against the joints' one; `offsets`: stream -> its joints, one by one."""
 
     findings: tuple[StreamFinding, ...]
     clocks: Mapping[str, ClockFit]
     following: tuple[Following, ...]
     stands: tuple[Stand, ...]
-    unseen: tuple[str, ...]
+    examinations: tuple[ExaminationRecord, ...]
+    offsets: Mapping[str, tuple[AngleOffset, ...]] = field(default_factory=dict[str, tuple[AngleOffset, ...]])
+
+    @property
+    def unseen(self) -> tuple[str, ...]:
+        """What of the recorded devices this recording does not show, in sentences."""
+        left = (one for one in not_examined(self.examinations) if one.expected)
+        return tuple(f"{one.what}{f' ({one.where})' if one.where else ''}: {one.reason}" for one in left)
 
 
 def examine(
@@ -53,26 +63,35 @@ def examine(
     predicted: Predicted | None = None,
     windows: Sequence[Window] | None = None,
     causes: Causes | None = None,
+    levers: GravityLevers | None = None,
+    zeros_rad: Sequence[float | None] = (),
+    *,
+    arm: bool = True,
 ) -> StreamReport:
     """Streams as `devices_of` gives them. `predicted`: a model's word on the spots; without it their clock is open.
 
     `windows`: when the samples were taken, on the clock of the spots, one a sample. `causes`: what physics may do
-    between the two encoders of a joint.
+    between the two encoders of a joint. `levers`: torque of gravity about each joint. `zeros_rad`: what the second
+    encoder of each joint shows at the joint's zero, where that is stated. `arm`: False of a log of encoders alone.
     """
     found, devices = _mended(devices)
     joints, command = devices.get("joints"), devices.get("command")
     if joints is None:
-        return StreamReport(tuple(found), {}, (), (), ("no stream of joints: nothing can be compared with the motion",))
+        return StreamReport(tuple(found), {}, (), (), stream_examinations(Seen(devices, tuple(found)), arm=arm))
     stands = stands_of((command or joints).track)
     clocks: dict[str, ClockFit] = {}
     behind: tuple[Following, ...] = ()
-    bent: tuple[Deflection, ...] = ()
+    second: _Second | None = None
+    offsets: dict[str, tuple[AngleOffset, ...]] = {}
     if command is not None:
         behind = following(command.track, joints.track)
         found += [following_finding(one) for one in behind if one.outcome is Outcome.FOUND]
+        offsets["joints"] = angle_offsets(joints.track, command.track, levers, wraps=False)
     if "encoders" in devices:
-        clocks["encoders"], more, bent = _encoders(joints, devices["encoders"], stands, causes, devices.get("torque"))
-        found += more
+        second = _encoders(joints, devices["encoders"], stands, causes, devices.get("torque"), levers, zeros_rad)
+        clocks["encoders"], offsets["encoders"] = second.clock, second.offsets
+        found += second.findings
+    found += [more for name, each in offsets.items() for one in each for more in offset_findings(name, one)]
     if "spots" in devices:
         seen = _spots(joints, devices["spots"], stands, predicted)
         found += seen.findings + _unsettled(devices["spots"], seen, windows, stands, joints.track.channels)
@@ -83,30 +102,9 @@ def examine(
         if late is not None and late.counts:
             found.append(late_finding(name, late, joints.track.channels))
     found += _rings(joints.track, stands)
-    return StreamReport(tuple(found), clocks, behind, stands, tuple(_unseen(devices, clocks, behind, windows, bent)))
-
-
-def _unseen(
-    devices: Mapping[str, StreamDevice],
-    clocks: Mapping[str, ClockFit],
-    behind: Sequence[Following],
-    windows: Sequence[Window] | None,
-    bent: Sequence[Deflection],
-) -> Iterator[str]:
-    for name, fit in clocks.items():
-        if fit.offset_s is None:
-            yield f"clock of {name}: {fit.status.value}"
-    if "spots" in devices and "spots" not in clocks:
-        yield "clock of spots: no fitted model predicts them during the motion"
-    if "spots" in devices and windows is None:
-        yield "samples taken unsettled: the recording has no averaging times of the samples"
-    for one in bent:
-        if one.outcome is Outcome.NOT_DETERMINABLE:
-            yield f"compliance of joint {one.joint}: the motion is too short, or too even"
-        elif one.outcome is Outcome.ABSENT and one.compliance is not None and one.sigma is not None:
-            size = with_sigma(1e6 * one.compliance, 1e6 * one.sigma)
-            yield f"compliance of joint {one.joint}: {size} µrad/Nm is within what this motion leaves open"
-    yield from (f"following error of joint {f.joint}: it hardly moves" for f in behind if f.behind_s is None)
+    bent, judged_slips = ((), ()) if second is None else (second.bent, second.judged)
+    seen_all = Seen(devices, tuple(found), clocks, behind, offsets, bent, judged_slips, stands, windows)
+    return StreamReport(tuple(found), clocks, behind, stands, stream_examinations(seen_all), offsets)
 
 
 def _mended(devices: Mapping[str, StreamDevice]) -> tuple[list[StreamFinding], dict[str, StreamDevice]]:
@@ -124,18 +122,32 @@ def _mended(devices: Mapping[str, StreamDevice]) -> tuple[list[StreamFinding], d
     return found, out
 
 
+@dataclass(frozen=True, eq=False)
+class _Second:
+    """What the second encoders show; `judged` (channel,): whether slips were sought there."""
+
+    clock: ClockFit
+    findings: list[StreamFinding]
+    bent: tuple[Deflection, ...] = ()
+    judged: tuple[bool, ...] = ()
+    offsets: tuple[AngleOffset, ...] = ()
+
+
 def _encoders(
     joints: StreamDevice,
     encoders: StreamDevice,
     stands: tuple[Stand, ...],
     causes: Causes | None,
     torque: StreamDevice | None,
-) -> tuple[ClockFit, list[StreamFinding], tuple[Deflection, ...]]:
-    if encoders.track.joints:  # `causes` ask for the angles of all joints
-        joints, causes = replace(joints, track=joints.track.of([j - 1 for j in encoders.track.joints])), None
+    levers: GravityLevers | None,
+    zeros_rad: Sequence[float | None],
+) -> _Second:
+    if encoders.track.joints:  # `causes` and `levers` ask for the angles of all joints
+        joints = replace(joints, track=joints.track.of([j - 1 for j in encoders.track.joints]))
+        causes, levers = None, None
     fit = clock_between(joints.track, encoders.track, start_between(joints, encoders))
     if fit.offset_s is None:
-        return (*_by_stamps(joints, encoders, stands, causes), ()) if shares_host_clock(encoders) else (fit, [], ())
+        return _by_stamps(joints, encoders, stands, causes) if shares_host_clock(encoders) else _Second(fit, [])
     lags = following(joints.track, _moved(encoders.track, fit))
     alike = _alike(lags)
     if len(alike) >= limits.LAGGING_TOGETHER and any(one.outcome is Outcome.FOUND for one in lags):
@@ -148,9 +160,25 @@ def _encoders(
     friction = {one.joint for one in bent if one.friction_may_lag}
     found = [reading_lag_finding(one) for one in lags if one.outcome is Outcome.FOUND and one.joint not in friction]
     found += [deflection_finding(one) for one in bent if one.outcome is Outcome.FOUND]
-    found += [slip_finding(one) for one in slips(at_joints, joints.track, stands, causes).found]
+    slipped = slips(at_joints, joints.track, stands, causes)
+    found += [slip_finding(one) for one in slipped.found]
     frozen = [one for one in breaks(at_joints, None, _behind(joints.track, lags)) if one.fault is Fault.FROZEN]
-    return fit, found + break_findings(at_joints, frozen) + _rings(at_joints, stands), bent
+    found += break_findings(at_joints, frozen) + _rings(at_joints, stands)
+    own_zeros = [
+        zeros_rad[j] if j < len(zeros_rad) else None
+        for j in (at_joints.joint(c) - 1 for c in range(at_joints.channels))
+    ]
+    offsets = angle_offsets(at_joints, joints.track, levers, zeros_rad=own_zeros, wraps=True)
+    return _Second(fit, found, bent, slipped.judged, _without_known(offsets, slipped, bent))
+
+
+def _without_known(
+    offsets: tuple[AngleOffset, ...], slipped: Slips, bent: tuple[Deflection, ...]
+) -> tuple[AngleOffset, ...]:
+    """Without changes that are slips, and without droops that a measured torque explains or that discs have."""
+    stepped = {one.joint for one in slipped.found}
+    soft = {one.joint for one in bent if one.outcome is Outcome.FOUND}
+    return tuple(one.known(stepped=one.joint in stepped, bent=one.joint in soft) for one in offsets)
 
 
 def _behind(track: Track, lags: Sequence[Following]) -> Track:
@@ -165,7 +193,7 @@ def _behind(track: Track, lags: Sequence[Following]) -> Track:
 
 def _by_stamps(
     joints: StreamDevice, encoders: StreamDevice, stands: tuple[Stand, ...], causes: Causes | None
-) -> tuple[ClockFit, list[StreamFinding]]:
+) -> _Second:
     """A host that runs at no even pace beside the joints leads to their clock piece by piece, to some milliseconds.
 
     That is enough for what stays from stand to stand, and for nothing that is a matter of time.
@@ -174,9 +202,9 @@ def _by_stamps(
     track = replace(encoders.track, time_s=at_s)
     fit = clock_between(joints.track, track, Ticks(0.0))
     if fit.offset_s is None:
-        return fit, []
-    found = [slip_finding(one) for one in slips(_moved(track, fit), joints.track, stands, causes).found]
-    return ClockFit(ClockStatus.UNEVEN), found
+        return _Second(fit, [])
+    found = slips(_moved(track, fit), joints.track, stands, causes)
+    return _Second(ClockFit(ClockStatus.UNEVEN), [slip_finding(one) for one in found.found], judged=found.judged)
 
 
 def _alike(lags: Sequence[Following]) -> list[int]:

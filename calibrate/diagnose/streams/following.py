@@ -32,6 +32,7 @@ class Following:
     by_acceleration_sigma_s2: float | None = None
     kind: str = "undetermined"  # "delay", "first-order lag", "undetermined"
     p: float = 1.0
+    why: str = ""  # nothing is determined
 
     @property
     def velocity_gain_per_s(self) -> float | None:
@@ -42,13 +43,7 @@ class Following:
 def following(command: Track, reading: Track) -> tuple[Following, ...]:
     """Both on one clock, one channel a joint."""
     reading = reading.read()
-    curve = command.curve
-    at = curve.at(reading.time_s)
-    v = (curve.at(reading.time_s + limits.SPEED_OVER_S) - curve.at(reading.time_s - limits.SPEED_OVER_S)) / (
-        2.0 * limits.SPEED_OVER_S
-    )
-    bend = curve.at(reading.time_s + limits.SPEED_OVER_S) - 2.0 * at + curve.at(reading.time_s - limits.SPEED_OVER_S)
-    a = bend / limits.SPEED_OVER_S**2
+    at, v, a = course_of(command, reading.time_s)
     good = np.all(np.isfinite(at) & np.isfinite(v) & np.isfinite(a), axis=1)
     block = np.floor((reading.time_s - reading.time_s[:1].sum()) / limits.BLOCK_S).astype(np.intp)
     return tuple(
@@ -57,12 +52,21 @@ def following(command: Track, reading: Track) -> tuple[Following, ...]:
     )
 
 
+def course_of(track: Track, time_s: Floats) -> tuple[Floats, Floats, Floats]:
+    """(time, channel) value, speed and acceleration of a track, by differences over SPEED_OVER_S; NaN in gaps."""
+    curve, step_s = track.curve, limits.SPEED_OVER_S
+    at, ahead, back = curve.at(time_s), curve.at(time_s + step_s), curve.at(time_s - step_s)
+    return at, (ahead - back) / (2.0 * step_s), (ahead - 2.0 * at + back) / step_s**2
+
+
 def _joint(joint: int, error: Floats, v: Floats, a: Floats, block: NDArray[np.intp]) -> Following:
-    if not len(error) or float(np.sqrt(np.mean(v**2))) < limits.SLOWEST_RAD_S:
-        return Following(joint, Outcome.NOT_DETERMINABLE)
+    if not len(error):
+        return Following(joint, Outcome.NOT_DETERMINABLE, why="no rows in which set-point and reading were both read")
+    if float(np.sqrt(np.mean(v**2))) < limits.SLOWEST_RAD_S:
+        return Following(joint, Outcome.NOT_DETERMINABLE, why="it hardly moves")
     line = fit(np.stack([v, a, np.ones_like(v)], axis=1), error, block, rounds=1)
     if line is None:
-        return Following(joint, Outcome.NOT_DETERMINABLE)
+        return Following(joint, Outcome.NOT_DETERMINABLE, why="the motion is too short, or too even")
     behind_s, sigma_s = float(line.values[0]), float(line.sigma[0])
     p = float(2.0 * ndtr(-abs(behind_s) / max(sigma_s, 1e-300)))
     found = p < limits.FOLLOWING_ALPHA and abs(behind_s) > limits.BEHIND_S

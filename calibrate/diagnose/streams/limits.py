@@ -74,3 +74,14 @@ SLIP_SPARE_STANDS = 5  # stands beyond the numbers that are fitted
 SLIP_PHYSICS_STANDS = 12  # further stands, from which on physics may explain the same
 MOST_SLIPS = 5  # slips of one joint; with more it is not slipping but loose
 SLIP_EDGE_S = 0.1  # s after the set-point stands, before readings count
+
+# What stays between two readings of one angle
+OFFSET_SIGMAS = 5.0  # sigmas of an offset that is reported
+# factors on what nothing explains and on what goes with the motion, rms: a servo with 30 mrad of following error (wrist
+# of a KR 300) leaves 10 mrad of levels and steps, too, and an offset that is no larger is one of them
+OFFSET_BEYOND_LEFT = 5.0
+OFFSET_BEYOND_MOTION = 2.0
+OFFSET_LEAVES = 0.5  # share of what is left without it, rms, that may be left with a step or a droop
+FINEST_RAD = 1e-6  # rad; a fifth of an arc second: no encoder of a joint shows less
+OFFSET_TURN_RAD = 1.0  # rad; over a shorter way a sine of the angle is not separated from a level
+STANDS_RAD = 1e-3  # rad; a joint that turns through less has not moved

@@ -7,6 +7,7 @@ import numpy as np
 
 from calibrate.diagnose.assess.diagnosis import Named
 from calibrate.diagnose.streams import limits
+from calibrate.diagnose.streams.angle_offsets import AngleOffset, OffsetStretch
 from calibrate.diagnose.streams.clock_faults import Late
 from calibrate.diagnose.streams.continuity import Break, Fault
 from calibrate.diagnose.streams.deflection import Deflection
@@ -16,6 +17,7 @@ from calibrate.diagnose.streams.settling import Unsettled, Window
 from calibrate.diagnose.streams.slips import Slip
 from calibrate.diagnose.streams.track import Outcome, Track
 from calibrate.model.effects.term import Size, with_sigma
+from calibrate.quantities import angle_with_sigma
 
 
 @dataclass(frozen=True)
@@ -157,6 +159,56 @@ def slip_finding(one: Slip) -> StreamFinding:
         f"between {one.from_s:.3f} and {one.to_s:.3f} s"
     )
     return StreamFinding(name, "encoders", Outcome.FOUND, sizes, one.from_s, one.to_s, max(one.p, CERTAIN), says)
+
+
+OFFSET, DROOP, ECCENTRIC = "angle-offset", "droop", "encoder-eccentricity"
+AGAINST = {"joints": "its set-point", "encoders": "the joint's reading"}
+
+
+def offset_findings(stream: str, one: AngleOffset) -> list[StreamFinding]:
+    """Of one joint: the offset of each stretch that has one, or its change, and the droop."""
+    changes = len(one.stretches) > 1
+    shown = one.stretches[1:] if one.zeroless else [s for s in one.stretches if s.found]
+    if changes and not shown:
+        shown = one.stretches[1:]
+    found = [_offset_finding(stream, one, stretch, changes=changes) for stretch in shown] if _decides(one) else []
+    return found if one.droop is None else [*found, _droop_finding(stream, one, one.droop)]
+
+
+def _decides(one: AngleOffset) -> bool:
+    return len(one.stretches) > 1 or any(stretch.found for stretch in one.stretches)
+
+
+def _offset_finding(stream: str, one: AngleOffset, stretch: OffsetStretch, *, changes: bool) -> StreamFinding:
+    name = Named(f"joint{one.joint}.angle", ("t" if changes else "recording",), "constant", None, OFFSET)
+    size, which = stretch.offset, "offset_rad"
+    if one.zeroless:  # its own beginning is the zero
+        first = one.stretches[0].offset
+        size = Size(size.value - first.value, float(np.hypot(size.sigma, first.sigma)))
+        which = "change_rad"
+    when = f" between {stretch.from_s:.2f} and {stretch.to_s:.2f} s" if changes else ""
+    since = " than at the beginning" if one.zeroless else f" than {AGAINST[stream]} whatever the motion"
+    way = "more" if size.value >= 0.0 else "less"
+    says = (
+        f"the reading of joint {one.joint} in {stream} shows {angle_with_sigma(abs(size.value), size.sigma)} {way}"
+        f"{since}{when}"
+    )
+    ends = (stretch.from_s, stretch.to_s) if changes else (None, None)
+    return StreamFinding(name, stream, Outcome.FOUND, {which: size}, *ends, CERTAIN, says)
+
+
+def _droop_finding(stream: str, one: AngleOffset, size: Size) -> StreamFinding:
+    """Where the joint's own angle explains it, a disc off its centre may, too, between two encoders."""
+    where, turn = f"joint{one.joint}.angle", (f"q{one.joint}",)
+    own = Named(where, turn, "harmonic", 1, DROOP)
+    name = Named(where, (f"gravity_torque{one.joint}",), "linear", None, DROOP) if one.by_gravity else own
+    rivals = (Named(where, turn, "harmonic", 1, ECCENTRIC),) if stream == "encoders" and not one.by_gravity else ()
+    by = "as gravity turns the joint" if one.by_gravity else "with one turn of sine of its own angle"
+    says = (
+        f"the reading of joint {one.joint} in {stream} sags from {AGAINST[stream]} by up to "
+        f"{angle_with_sigma(size.value, size.sigma)} {by}"
+    )
+    return StreamFinding(name, stream, Outcome.FOUND, {"droop_rad": size}, None, None, CERTAIN, says, rivals)
 
 
 def ringing_finding(track: Track, one: Ringing) -> StreamFinding:

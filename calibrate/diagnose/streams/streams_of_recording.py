@@ -18,6 +18,7 @@ from msgspec.structs import replace
 from numpy.typing import NDArray
 
 from acquisition.recording import Recording
+from acquisition.recording.rig import Rig
 from calibrate.diagnose.assess.diagnosis import NAMED, Named, Verdict
 from calibrate.diagnose.record.schema import (
     ClockRecord,
@@ -28,12 +29,15 @@ from calibrate.diagnose.record.schema import (
     StreamsRecord,
 )
 from calibrate.diagnose.state.fitted import Fitted
+from calibrate.diagnose.streams.angle_offsets import GravityLevers
 from calibrate.diagnose.streams.clock import ClockFit
 from calibrate.diagnose.streams.examine import Predicted, StreamReport, examine
 from calibrate.diagnose.streams.recorded import StreamDevice, by_host, devices_of
 from calibrate.diagnose.streams.settling import Window
 from calibrate.diagnose.streams.slips import causes_of
 from calibrate.diagnose.streams.stream_findings import StreamFinding
+from calibrate.model.arms.catalogue import arm_of
+from calibrate.model.parameters import start_values
 from calibrate.model.predict import Predictor
 
 Floats = NDArray[np.float64]
@@ -90,6 +94,7 @@ def around(
 
 
 ORDERS = (1, 2)
+ROWS_AT_ONCE = 20_000  # poses whose frames are held at a time
 
 
 def streams_of(recording: Recording, fitted: Fitted | None) -> StreamReport | None:
@@ -101,7 +106,31 @@ def streams_of(recording: Recording, fitted: Fitted | None) -> StreamReport | No
     if fitted is not None and "spots" in devices and "joints" in devices:
         placed = around(recording, windows, devices["spots"], devices["joints"])
         predicted = None if placed is None else predicted_spots(fitted, placed)
-    return examine(devices, predicted, windows, None if fitted is None else causes_of(fitted))
+    rig = recording.rig
+    zeros_rad = [joint.encoder_zero_rad for joint in rig.arm.joints] if rig.n_joints else []
+    causes = None if fitted is None else causes_of(fitted)
+    arm = rig.n_joints > 0
+    return examine(devices, predicted, windows, causes, gravity_levers(rig), zeros_rad, arm=arm)
+
+
+def gravity_levers(rig: Rig) -> GravityLevers | None:
+    """Torque of gravity (Nm) about each joint, of one kilogram at the end of every link behind it. None: no arm."""
+    if not rig.n_joints:
+        return None
+    arm, gravity = arm_of(rig), np.array(rig.arm.gravity_m_s2)
+    nominal = start_values(arm.parameters)
+
+    def levers(q_rad: Floats) -> Floats:
+        out = np.empty(q_rad.shape)
+        for rows in np.array_split(np.arange(len(q_rad)), max(1, len(q_rad) // ROWS_AT_ONCE)):
+            frames = arm.frames(nominal, q_rad[rows])
+            axes, ends = frames[:, :-1, :3, 2], frames[:, 1:, :3, 3]
+            for j in range(q_rad.shape[1]):
+                arms = np.sum(ends[:, j:] - frames[:, j, None, :3, 3], axis=1)
+                out[rows, j] = np.einsum("nk,nk->n", axes[:, j], np.cross(arms, gravity))
+        return out
+
+    return levers
 
 
 def predicted_spots(fitted: Fitted, around: AroundSamples) -> Predicted | None:
@@ -141,6 +170,8 @@ EXPLAINS = {
     "time-backwards": "Samples came out of order, or the clock was set back.",
     "missing-samples": "What a bus or its reader lost; gaps are left as gaps.",
     "duplicated-samples": "The same sample was delivered again.",
+    "angle-offset": "A zero that was set or stored otherwise, or a reading that belongs to another joint's zero.",
+    "droop": "A position loop without integral action, or a soft drive, hangs in proportion to the torque of gravity.",
 }
 
 
@@ -158,7 +189,8 @@ def with_streams(file: DiagnosisFile, report: StreamReport | None) -> DiagnosisF
     )
     differs = faults and file.verdict == Verdict.CONSISTENT.value
     verdict = Verdict.MISMATCH.value if differs else file.verdict
-    return replace(file, verdict=verdict, findings=file.findings + faults, streams=streams)
+    examinations = (*file.examinations, *report.examinations)
+    return replace(file, verdict=verdict, findings=file.findings + faults, streams=streams, examinations=examinations)
 
 
 def _known(one: StreamFinding, file: DiagnosisFile) -> bool:

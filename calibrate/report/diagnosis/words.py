@@ -3,7 +3,9 @@
 import re
 from collections.abc import Iterator, Sequence
 
+from acquisition.recording.examination import all_examined, examined_names, not_examined
 from calibrate.diagnose.assess import Statement
+from calibrate.diagnose.record.pose_examinations import PHYSICS
 from calibrate.diagnose.record.schema import (
     ClockRecord,
     DiagnosisFile,
@@ -44,6 +46,8 @@ def verdict_words(file: DiagnosisFile) -> str:
     """What was found, what is left, and what the answer is worth."""
     if any(not gross_error.rows for gross_error in file.blunders):
         return "The file is wrong as a whole: nothing can be determined about the arm."
+    if file.streams is not None and not file.samples:
+        return _streams_verdict(file)
     match file.verdict:
         case "mismatch" if file.known is not None:
             found = counted(len(file.findings), "change")
@@ -60,6 +64,26 @@ def verdict_words(file: DiagnosisFile) -> str:
             return f"Undecidable: the diagnosis was not completed ({stages})."
         case _:
             return f"Undecidable: {_something(file)}{_tested(file)}."
+
+
+def _streams_verdict(file: DiagnosisFile) -> str:
+    """Of a recording without settled samples: no fault only where all that it allows was examined."""
+    poses = "; no settled poses were recorded" if any(one.what == PHYSICS.what for one in file.examinations) else ""
+    if file.findings:
+        return f"Streams only: {counted(len(file.findings), 'cause')} found{poses}."
+    unexplained = file.unexplained is not None
+    if all_examined(file.examinations) and not file.incomplete and not unexplained:
+        return f"Streams only: no fault found{poses}."
+    examined = ", ".join(examined_names(file.examinations))
+    if not examined:
+        return "Streams only: nothing was examined; the reasons are below."
+    left = "something unexplained is left" if unexplained else "nothing found"
+    return f"Streams only: {left} in what was examined ({examined}){poses}; not examined: {_left_out(file)}."
+
+
+def _left_out(file: DiagnosisFile) -> str:
+    expected = (one.what for one in not_examined(file.examinations) if one.expected)
+    return ", ".join(dict.fromkeys((*expected, *(one.stage for one in file.incomplete))))
 
 
 def _how_far(file: DiagnosisFile) -> str:
@@ -210,7 +234,6 @@ def stream_words(file: DiagnosisFile) -> Iterator[str]:
             yield _clock_words(clock)
     for usual in file.streams.usual:
         yield f"usual: {usual.says}"
-    yield from file.streams.unseen
 
 
 def _clock_words(clock: ClockRecord) -> str:

@@ -10,6 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from acquisition.recording.rig import Rig
+from calibrate.diagnose import limits
 from calibrate.diagnose.state.linearised import UnseenMisfits, WhitenedRows
 from calibrate.model.effects.drivers import Drivers
 from calibrate.model.effects.ports import Place, Port
@@ -116,6 +117,10 @@ class LinearSession:
     @property
     def samples(self) -> int:
         return len(self.active)
+
+    @property
+    def most_search_rows(self) -> int:
+        return limits.MOST_SEARCH_ROWS
 
     @property
     def distrusted(self) -> int:

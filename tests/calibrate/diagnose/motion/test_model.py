@@ -11,7 +11,7 @@ import pytest
 from acquisition.recording import Recording
 from benchmarks.drawn_motion import Hidden, recorded, with_more
 from calibrate.apply.export import export_model, form_named
-from calibrate.diagnose.motion import diagnose_torques, expected_nm, model_of_motion, torques_of_model
+from calibrate.diagnose.motion import TorqueDiagnosis, diagnose_torques, expected_nm, model_of_motion, torques_of_model
 from calibrate.diagnose.motion.links_alone import motion_drivers
 from calibrate.diagnose.motion.motion_table import Motion, motion_of
 from calibrate.diagnose.motion.physical_links import is_physical, physical
@@ -29,7 +29,7 @@ def model(tmp_path_factory: pytest.TempPathFactory) -> ModelFile:
     """As it stands in its file."""
     recording = recorded(MARCH, seed=4)
     found = diagnose_torques(recording, np.random.default_rng(1))
-    assert found is not None
+    assert isinstance(found, TorqueDiagnosis)
     path = tmp_path_factory.mktemp("model") / "model.json"
     write_model(path, model_of_motion(recording, torques_of_model(found, "march.mcap")))
     return read_model(path)
@@ -45,7 +45,7 @@ def torques(model: ModelFile) -> TorquesOfModel:
 def motion(recording: Recording) -> Motion:
     """Of a recording that holds one."""
     found = motion_of(recording)
-    assert found is not None
+    assert isinstance(found, Motion)
     return found
 
 
@@ -58,7 +58,7 @@ def test_the_torques_of_another_motion_are_expected_to_the_noise(torques: Torque
 
 def test_what_has_changed_since_is_found_beside_the_model_with_both_sigmas(torques: TorquesOfModel) -> None:
     found = diagnose_torques(recorded(NOW, seed=2), np.random.default_rng(1), torques)
-    assert found is not None
+    assert isinstance(found, TorqueDiagnosis)
     sizes = {(f.name.physics, f.name.where): next(iter(f.parameters.values())) for f in found.diagnosis.findings}
     changes = {"joint3.torque": 2.0, "joint2.torque": -1.0}
     assert set(sizes) == {*(("coulomb-friction", where) for where in changes), ("payload", "tool.load")}
@@ -69,7 +69,7 @@ def test_what_has_changed_since_is_found_beside_the_model_with_both_sigmas(torqu
 
 def test_nothing_has_changed_where_nothing_has(torques: TorquesOfModel) -> None:
     found = diagnose_torques(recorded(MARCH, seed=3), np.random.default_rng(1), torques)
-    assert found is not None
+    assert isinstance(found, TorqueDiagnosis)
     assert found.diagnosis.findings == ()
 
 
@@ -112,7 +112,7 @@ def test_a_cause_without_a_name_is_expected_again(tmp_path: Path) -> None:
     """A wave of the joint's own angle that is no order of the motor, found at one motion and expected at another."""
     first, second = (with_more(recorded(Hidden(), seed=seed), 2, wave) for seed in (1, 2))
     found = diagnose_torques(first, np.random.default_rng(1))
-    assert found is not None
+    assert isinstance(found, TorqueDiagnosis)
     (effect,) = torques_of_model(found, "wave").effects
     assert (effect.physics, effect.where, effect.depends_on) == ("unknown", "joint2.torque", "q2")
     seen = motion(second)

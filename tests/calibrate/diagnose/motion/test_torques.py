@@ -6,10 +6,15 @@ import numpy as np
 import pytest
 from msgspec import structs
 
+from acquisition.recording.examination import NOT_EXAMINED, ExaminationRecord
 from acquisition.recording.rig.schema import Follows
 from benchmarks.drawn_motion import Hidden, recorded, with_more
+from calibeam.results.diagnosis import without_samples
+from calibrate.diagnose.assess import assessment
+from calibrate.diagnose.assess.assessment import thinned
 from calibrate.diagnose.assess.diagnosis import Verdict
-from calibrate.diagnose.motion import diagnose_torques
+from calibrate.diagnose.limits import MOST_SEARCH_ROWS
+from calibrate.diagnose.motion import TorqueDiagnosis, diagnose_torques, with_torques
 from calibrate.diagnose.motion.links_alone import torque_state
 from calibrate.diagnose.motion.motion_table import motion_of
 from calibrate.diagnose.search.bench import Bench
@@ -30,7 +35,7 @@ LAWS = {
 
 def diagnosed(hidden, **more):
     found = diagnose_torques(recorded(hidden, **more), np.random.default_rng(1))
-    assert found is not None
+    assert isinstance(found, TorqueDiagnosis)
     return found.diagnosis
 
 
@@ -49,7 +54,7 @@ def test_a_mechanism_is_named_at_its_joint_with_its_size(name):
 
 def found_beside(hidden, joint, law):
     found = diagnose_torques(with_more(recorded(hidden), joint, law), np.random.default_rng(1))
-    assert found is not None
+    assert isinstance(found, TorqueDiagnosis)
     return {(f.name.physics, f.name.where): f for f in found.diagnosis.findings if f.share > 0.01}
 
 
@@ -109,7 +114,7 @@ def test_standing_joints_show_no_torque():
     recording = recorded(Hidden(), length_s=2.0)
     values = recording.streams["robot"].values
     values["actual_q_rad"][:] = values["actual_q_rad"][0]
-    assert diagnose_torques(recording, np.random.default_rng(1)) is None
+    assert_not_examined(diagnose_torques(recording, np.random.default_rng(1)))
 
 
 def test_a_slow_log_in_short_pieces_shows_nothing_and_raises_nothing():
@@ -123,7 +128,8 @@ def test_a_slow_log_in_short_pieces_shows_nothing_and_raises_nothing():
             sequence=stream.sequence[rows],
             values={name: values[rows] for name, values in stream.values.items()},
         )
-        assert diagnose_torques(replace(recording, streams={"robot": few}), np.random.default_rng(1)) is None
+        found = diagnose_torques(replace(recording, streams={"robot": few}), np.random.default_rng(1))
+        assert_not_examined(found)
 
 
 def test_torques_of_another_device_are_brought_to_the_clock_of_the_joints():
@@ -135,16 +141,47 @@ def test_torques_of_another_device_are_brought_to_the_clock_of_the_joints():
     torque = replace(torque, values=values, sequence=stream.sequence.copy(), device_s=stream.device_s + 0.5)
     both = replace(recording, streams={"robot": joints, "drives": torque})
     found = diagnose_torques(both, np.random.default_rng(1))
-    assert found is not None
+    assert isinstance(found, TorqueDiagnosis)
     assert [f.name.physics for f in found.diagnosis.findings if f.share > 0.01] == ["coulomb-friction"]
 
 
-def test_an_arm_whose_joint_follows_another_one_is_left_alone():
+def assert_not_examined(found, reason=""):
+    assert isinstance(found, ExaminationRecord)
+    assert found.outcome == NOT_EXAMINED
+    assert found.expected
+    assert reason in found.reason
+    assert found.remedy
+
+
+def test_torques_of_an_arm_whose_joint_follows_another_one_are_not_examined():
     recording = recorded(Hidden())
     joints = list(recording.rig.arm.joints)
     joints[2] = structs.replace(joints[2], follows=Follows(2, -1.0))
     rig = structs.replace(recording.rig, arm=structs.replace(recording.rig.arm, joints=tuple(joints)))
-    assert diagnose_torques(replace(recording, rig=rig), np.random.default_rng(1)) is None
+    assert_not_examined(diagnose_torques(replace(recording, rig=rig), np.random.default_rng(1)), "joint 3 follows")
+
+
+def test_every_torque_of_a_motion_is_searched():
+    """More than a search of poses works on: single moments at random would cut the memory of the noise."""
+    recording = recorded(Hidden())
+    motion = motion_of(recording)
+    assert not isinstance(motion, ExaminationRecord)
+    state = torque_state(recording.rig, motion, None)
+    assert int(state.rows.data.sum()) > MOST_SEARCH_ROWS
+    assert thinned(state, np.random.default_rng(1)) is state
+
+
+def test_a_stage_of_the_torques_that_fails_is_named_in_the_file(monkeypatch):
+    def failing(*_):
+        raise np.linalg.LinAlgError("SVD did not converge")
+
+    monkeypatch.setattr(assessment, "_unseen_squares", failing)
+    found = diagnose_torques(recorded(Hidden(), length_s=6.0), np.random.default_rng(1))
+    nothing = without_samples(recorded(Hidden(), length_s=2.0).rig, "")
+    file = with_torques(nothing, found)
+    assert file.incomplete
+    assert all(one.stage.startswith("torques in motion, ") for one in file.incomplete)
+    assert all("did not converge" in one.reason for one in file.incomplete)
 
 
 @pytest.mark.endure

@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from calibrate.diagnose.assess import limits
+from calibrate.diagnose import limits
 from calibrate.diagnose.assess.assessment import thinned
 from tests.calibrate.diagnose.conftest import World
 
-SAMPLES = limits.MOST_ROWS // World().channels  # of so many rows each
+SAMPLES = limits.MOST_SEARCH_ROWS // World().channels  # of so many rows each
 
 
 def test_a_short_session_is_searched_whole():

@@ -38,4 +38,7 @@ def test_one_lag_of_the_second_encoders_no_slack_no_slip_and_compliance_of_the_s
         size = one.parameters["stiffness_nm_per_rad"]
         assert size.value is not None
         assert 3e6 < size.value < 3e7
-    assert sum("compliance of joint" in said for said in file.streams.unseen) == 3 - len(by)
+    bent = [one for one in file.examinations if one.what == "joint compliance between encoders"]
+    assert [one.outcome == "found" for one in bent].count(True) == len(by)
+    assert all(one.limit is not None for one in bent if one.outcome == "nothing found")
+    assert "angle-offset" not in {one.physics for one in file.findings}
