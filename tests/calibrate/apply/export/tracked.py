@@ -59,6 +59,26 @@ def tracked(folder, name, *, lengths_m=0.0, rows=60, seed=1, yields_rad_nm=0.0):
     return folder
 
 
+def with_discs(folder, eccentricity_rad, seed=1):
+    """The same session with encoder discs off centre, which the rig file leaves open to an identification."""
+    table, rng = folder / "samples.csv", np.random.default_rng(seed)
+    with table.open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    columns = [name for name in rows[0] if name.startswith("q")]
+    sizes = rng.normal(0.0, eccentricity_rad, (len(columns), 2))
+    for row in rows:
+        for name, (sine, cosine) in zip(columns, sizes.tolist(), strict=True):
+            q = float(row[name])
+            row[name] = q + sine * np.sin(q) + cosine * np.cos(q)
+    with table.open("w", newline="") as file:
+        writer = csv.DictWriter(file, rows[0].keys())
+        writer.writeheader()
+        writer.writerows(rows)
+    with (folder / "rig.toml").open("a") as file:
+        file.write("\n[tolerance]\nlength_m = 1e-3\nangle_rad = 2e-3\neccentricity_rad = 1e-3\n")
+    return folder
+
+
 def _parts(arm, joints):
     """(4, 4) in front of each joint; of a Denavit-Hartenberg table also the one behind the last."""
     if arm["model"] == "local-poe":
