@@ -88,7 +88,7 @@ def diagnose_command(
         _print_lines(console, [f"diagnosis: {out}", modelled], json=json)
         return
     with naming_source(recording):
-        with stages_shown(Console(stderr=True), len(source.samples)) as begun:
+        with stages_shown(Console(stderr=True)) as begun:
             found, file = diagnose_recording(source, known, partial(write_diagnosis, out), begun)
         write_diagnosis(out, file)
         lines, refused = list[str](), None
