@@ -34,6 +34,10 @@ class Console(rich.console.Console):
     def file(self, new_file: IO[str]) -> None:
         rich.console.Console.file.__set__(self, new_file)
 
+    def on_broken_pipe(self) -> None:
+        """Rich ends the process with 1; who has read enough is no error, as the command line has it."""
+        raise BrokenPipeError
+
     def render(self, renderable: RenderableType, options: ConsoleOptions | None = None) -> Iterable[Segment]:
         """As Rich's, cleaned."""
         for text, style, control in super().render(renderable, options):

@@ -122,12 +122,15 @@ def correct_command(
     )
     console = Console(soft_wrap=True, highlight=False)
     job = _Job.of(model, start, condition)
-    job = replace(job, frame=_frame(console, job, frame, points, options))
-    found, names, frames, called, left, notes = (
-        _table(job, poses, out, options)
-        if poses.suffix.lower() == ".csv"
-        else _program(console, job, poses, out, options, verbose)
-    )
+    T_base_frame, measured = _frame(job, frame, points, options)
+    job = replace(job, frame=T_base_frame)
+    table = poses.suffix.lower() == ".csv"
+    done = _table(job, poses, out, options) if table else _program(job, poses, out, options)
+    found, names, frames, called, left, notes, diff = done
+    if measured:
+        console.print(measured, markup=False)
+    if not table:
+        _print_program(console, diff, found, names, verbose)
     needless = tuple(
         f"{c} is given; no effect of the model depends on it"
         for c in job.every
@@ -166,20 +169,20 @@ class _Job:
 
 
 Done = tuple[
-    Corrected, list[str], Floats, list[str], int, tuple[str, ...]
-]  # names, frames, theirs, how many left, notes
+    Corrected, list[str], Floats, list[str], int, tuple[str, ...], tuple[str, ...]
+]  # names, frames, theirs, how many left, notes, lines that changed
 
 
-def _frame(console: Console, job: _Job, given: tuple[str, ...], points: Path | None, options: Options) -> Floats | None:
-    """(4, 4) as stated, or as fitted to touched points, which is printed."""
+def _frame(job: _Job, given: tuple[str, ...], points: Path | None, options: Options) -> tuple[Floats | None, str]:
+    """(4, 4) as stated, or as fitted to touched points, and a sentence about it."""
     if points is None:
         if not given:
-            return None
+            return None, ""
         try:
             x, y, z, rx, ry, rz = map(float, given)
         except ValueError:
             raise DataError(f"--frame {' '.join(given)}: six numbers, or a name together with --points") from None
-        return _pose((x, y, z, rx, ry, rz))
+        return _pose((x, y, z, rx, ry, rz)), ""
     if len(given) != 1:
         raise DataError(f"--points {points}: give the name of the frame that they lie in: --frame NAME")
     in_frame_m, q_rad = read_points(_text(points, "utf-8"), str(points), job.n_joints)
@@ -187,12 +190,10 @@ def _frame(console: Console, job: _Job, given: tuple[str, ...], points: Path | N
     found = measured_frame(job.known, in_frame_m, q_rad, every, options)
     place = [*found.T_base_frame[:3, 3], *Rotation.from_matrix(found.T_base_frame[:3, :3]).as_rotvec()]
     shift_um, turn_urad = UM * np.linalg.norm(found.sigma[:3]), UM * np.linalg.norm(found.sigma[3:])
-    console.print(
+    return found.T_base_frame, (
         f"frame {given[0]}: {' '.join(f'{v:.6f}' for v in place)} (m, rotation vector in rad) ± {shift_um:.2g} µm, "
-        f"± {turn_urad:.2g} µrad; {len(q_rad)} points, {UM * found.rms_m:.2g} µm rms: enter it into the controller",
-        markup=False,
+        f"± {turn_urad:.2g} µrad; {len(q_rad)} points, {UM * found.rms_m:.2g} µm rms: enter it into the controller"
     )
-    return found.T_base_frame
 
 
 def _table(job: _Job, poses: Path, out: Path, options: Options) -> Done:
@@ -208,10 +209,10 @@ def _table(job: _Job, poses: Path, out: Path, options: Options) -> Done:
     )
     names = [f"pose {row + 1}" for row in range(len(wanted))]
     called = "parts in the robot's own base" if job.frame is None else "the frame of --frame"
-    return found, names, np.broadcast_to(place, (len(names), 4, 4)), [called] * len(names), 0, given
+    return found, names, np.broadcast_to(place, (len(names), 4, 4)), [called] * len(names), 0, given, ()
 
 
-def _program(console: Console, job: _Job, poses: Path, out: Path, options: Options, verbose: bool) -> Done:
+def _program(job: _Job, poses: Path, out: Path, options: Options) -> Done:
     dialect = dialect_of(poses.suffix)
     if dialect is None:
         raise DataError(f"{poses}: neither a table (.csv) nor a program (.script, .src, .dat, .mod, .prg, .ls)")
@@ -233,12 +234,11 @@ def _program(console: Console, job: _Job, poses: Path, out: Path, options: Optio
         )
 
     names = [of_file(name) for name in done.names]
-    _print_program(console, done.diff, done.found, names, verbose)
     notes = [of_file(sentence) for sentence in (*done.skipped, *done.warnings)]
     if done.kept:
         notes.append(f"{len(done.kept)} joint targets kept as they are ({', '.join(done.kept[:3])}): --joint-targets")
     called = [of_file(name) for name in done.frame_names]
-    return done.found, names, done.frames, called, len(done.skipped), tuple(notes)
+    return done.found, names, done.frames, called, len(done.skipped), tuple(notes), done.diff
 
 
 def _with_partner(poses: Path, out: Path) -> tuple[list[Path], list[Path]]:

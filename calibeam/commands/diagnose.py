@@ -5,7 +5,7 @@ from pathlib import Path
 
 import msgspec
 
-from acquisition.recording import read
+from acquisition.recording import Recording, read
 from acquisition.recording.pose_plan import POSE_PLAN
 from calibeam.console import Console
 from calibeam.overwriting import writes
@@ -21,9 +21,11 @@ from calibeam.results.diagnosis import (
     why_kept,
 )
 from calibeam.results.identification import naming_source
+from calibrate.diagnose.from_recording import Diagnosed
 from calibrate.diagnose.record.file import DIAGNOSIS, write_diagnosis
 from calibrate.diagnose.record.schema import DiagnosisFile
-from calibrate.model.model_file import MODEL, ModelFile, read_model, write_model
+from calibrate.errors import DataError
+from calibrate.model.model_file import MODEL, NOT_AS_FITTED, ModelFile, read_model, write_model
 from calibrate.report.elements.html import page_output
 
 
@@ -83,24 +85,39 @@ def diagnose_command(
             print(msgspec.json.encode(file).decode())
         else:
             print_streams(console, file)
-        _print_lines(console, (f"diagnosis: {out}", modelled), json=json)
+        _print_lines(console, [f"diagnosis: {out}", modelled], json=json)
         return
     with naming_source(recording):
-        with stages_shown(Console(stderr=True), len(source.samples)) as begun:
+        with stages_shown(Console(stderr=True)) as begun:
             found, file = diagnose_recording(source, known, partial(write_diagnosis, out), begun)
         write_diagnosis(out, file)
+        lines, refused = list[str](), None
+        try:  # whoever reads the text may end early: all files stand before it begins
+            refuse_wrong_file(found, out)
+            page = out.with_suffix(".html") if report is None else report
+            lines += _write_page(found, source, file, page, out, plan_out)
+            lines += [] if model_out is None else [_write_model(model_out, model_of(found, source), file)]
+        except DataError as why:
+            refused = why
         if json:
             print(msgspec.json.encode(file).decode())
         else:
             print_diagnosis(console, file, verbose=verbose)
-        refuse_wrong_file(found, out)
-        modelled = "" if model_out is None else _write_model(model_out, model_of(found, source), file)
-        planned = "" if plan_out is None else plan_next(found, plan_out)
+        _print_lines(console, lines, json=json)
+        if refused is not None:
+            raise refused
+
+
+def _write_page(
+    found: Diagnosed, source: Recording, file: DiagnosisFile, page: Path, out: Path, plan_out: Path | None
+) -> list[str]:
+    """The pages for a person, and the poses to measure next; lines about them and the diagnosis."""
+    planned = "" if plan_out is None else plan_next(found, plan_out)
     reported = msgspec.structs.replace(file, next=(*file.next, planned)) if planned else file
     from calibrate.report.diagnosis import write_diagnosis_report  # draws: nothing of it is needed in a search
 
-    page = write_diagnosis_report(out.with_suffix(".html") if report is None else report, source, reported)
-    _print_lines(console, (planned, f"diagnosis: {out}", modelled, f"report: {page}"), json=json)
+    written = write_diagnosis_report(page, source, reported)
+    return [planned, f"diagnosis: {out}", f"report: {written}"]
 
 
 def _write_model(path: Path, model: ModelFile, file: DiagnosisFile) -> str:
@@ -108,10 +125,11 @@ def _write_model(path: Path, model: ModelFile, file: DiagnosisFile) -> str:
     if kept := why_kept(path, model, file):
         return f"model: {path} is kept as it is: {kept}"
     write_model(path, model)
-    return f"model: {path}"
+    warnings = [f"warning: {alarm}" for alarm in model.alarms if alarm.startswith(NOT_AS_FITTED)]
+    return "\n".join([f"model: {path}", *warnings])
 
 
-def _print_lines(console: Console, lines: tuple[str, ...], *, json: bool) -> None:
+def _print_lines(console: Console, lines: list[str], *, json: bool) -> None:
     said = Console(stderr=True) if json else console  # nobody takes a model that was kept for a new one
     for line in filter(None, lines):
         said.print(line, markup=False, highlight=False)

@@ -118,11 +118,11 @@ def _identify(
     result = identify_session(source, planned, bootstrap)
     refuse_undetermined(result.status, result.estimates)
     model = write_session_model(result, source, out, planned)
+    exported = _export(rig_as_planned(source.rig, planned.plan), out, export)
     print_identification(console, result, session_evidence(source, model), verbose=verbose)
-    for sentence in (*unused_columns(source.samples), *controller_notes(source)):
-        console.print(sentence, markup=False, highlight=False)
-    console.print(f"model: {out}", markup=False)
-    _export(console, rig_as_planned(source.rig, planned.plan), out, export)
+    notes = (*unused_columns(source.samples), *controller_notes(source))
+    for line in (*notes, f"model: {out}", *exported):
+        console.print(line, markup=False, highlight=False)
     return result.status
 
 
@@ -133,19 +133,19 @@ def _refit(console: Console, recording: Path, known: ModelFile, out: Path, expor
     found = refit(known, source)
     out.parent.mkdir(parents=True, exist_ok=True)
     write_model(out, found.model)
-    for line in (*refitted_lines(found.model), *found.notes, f"model: {out}"):
+    exported = _export(source.rig, out, export)
+    for line in (*refitted_lines(found.model), *found.notes, f"model: {out}", *exported):
         console.print(line, markup=False, highlight=False)
-    _export(console, source.rig, out, export)
     return Status[found.model.status]
 
 
-def _export(console: Console, rig: Rig, out: Path, export: tuple[ExportForm, ...]) -> None:
+def _export(rig: Rig, out: Path, export: tuple[ExportForm, ...]) -> tuple[str, ...]:
+    """Writes the forms beside the model; lines about them."""
     if not export:
-        return
-    model, lost = read_model(out), tuple[str, ...]()
+        return ()
+    model, lines, lost = read_model(out), list[str](), tuple[str, ...]()
     for form in export:
         exported = out.with_name(out.stem + form.suffix)
         lost = export_model(exported, rig, model, form)
-        console.print(f"{form.name}: {exported}", markup=False)
-    for says in lost:
-        console.print(says, markup=False, highlight=False)
+        lines.append(f"{form.name}: {exported}")
+    return (*lines, *lost)

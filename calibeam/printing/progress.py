@@ -1,7 +1,8 @@
 """What a person sees of a long computation: done and planned, what is being done, time gone and left.
 
 A diagnosis shows its stage: on a terminal one line that is renewed every second, elsewhere a new line every ten
-seconds. How long a search takes is known at its end only, so what is left follows from the usual shares of the stages.
+seconds. How long it takes depends on how much is found, so nothing is stated before the search has ended, and a range
+afterwards: that of what recorded diagnoses still took, over what they had taken.
 """
 
 import threading
@@ -16,18 +17,15 @@ from calibeam.console import Console
 from calibrate.diagnose.stages import Stage
 
 TERMINAL_S, LINE_S = 1.0, 10.0
-SAMPLE_S = 0.02  # a sample: the first guess, before any stage has ended
-SHARES = {  # of the time of drawn and real sessions; a stage that is not here takes next to none
-    Stage.FAULTS: 0.08,
-    Stage.GEOMETRY: 0.04,
-    Stage.SEARCH: 0.17,
-    Stage.UNKNOWN: 0.38,  # 0.1 to 0.7: the more that is found the longer
-    Stage.PREDICTION: 0.03,
-    Stage.ALTERNATIVES: 0.05,
-    Stage.SCATTER: 0.07,
-    Stage.SIZES: 0.03,
-    Stage.PROOFS: 0.1,
-    Stage.FAR_ROWS: 0.05,
+# Time from the beginning of a stage to the end, over the time before it: half the least and twice the most of sessions
+# with a tracker, spots and a wire, with one cause and with several.
+REST = {
+    Stage.UNKNOWN: (0.25, 10.0),
+    Stage.PREDICTION: (0.15, 8.0),
+    Stage.SCATTER: (0.15, 3.2),
+    Stage.SIZES: (0.06, 1.8),
+    Stage.PROOFS: (0.035, 1.2),
+    Stage.FAR_ROWS: (0.01, 0.35),
 }
 
 
@@ -44,42 +42,47 @@ def progress_bar(console: Console) -> Progress:
 
 
 class Outlook:
-    """Where a diagnosis is, and how much time is left. Times in seconds of one clock."""
+    """Where a diagnosis is, and between which times is left. Times in seconds of one clock."""
 
-    def __init__(self, begun_s: float, samples: int) -> None:
-        self.begun_s = self._stage_begun_s = begun_s
-        self._whole_s = SAMPLE_S * samples
+    def __init__(self, begun_s: float) -> None:
+        self.begun_s = self._known_s = begun_s
         self._stage = Stage.FAULTS
+        self._known: Stage | None = None  # the last stage of REST that has begun
 
     def enter(self, stage: Stage, now_s: float) -> None:
-        """A stage begins: what the ones before it took gives how long all will take."""
-        done = _share_before(stage)
-        if done > 0.0:
-            self._whole_s = (now_s - self.begun_s) / done
-        self._stage, self._stage_begun_s = stage, now_s
+        """A stage begins."""
+        self._stage = stage
+        if stage in REST and stage is not self._known:
+            self._known, self._known_s = stage, now_s
 
-    def left_s(self, now_s: float) -> float:
-        """Never less than what the stages to come usually take: they take longer where this one does."""
-        done, gone_s = _share_before(self._stage), now_s - self.begun_s
-        behind = done + SHARES.get(self._stage, 0.0)  # as soon as this stage has ended
-        whole_s = max(self._whole_s, gone_s / behind) if behind > 0.0 else self._whole_s
-        if whole_s > self._whole_s:
-            return (1.0 - behind) * whole_s
-        return max((1.0 - done) * whole_s - (now_s - self._stage_begun_s), (1.0 - behind) * whole_s, 0.0)
+    def left_s(self, now_s: float) -> tuple[float, float] | None:
+        """Least and most; None before the search has ended. A stage that takes longer leaves more for those to come."""
+        if self._known is None:
+            return None
+        stages = list(REST)
+        behind = [*stages, None][stages.index(self._known) + 1]
+        then = (0.0, 0.0) if behind is None else REST[behind]
+        before_s, gone_s = self._known_s - self.begun_s, now_s - self.begun_s
+        passed_s = now_s - self._known_s
+        each = zip(REST[self._known], then, strict=True)
+        least_s, most_s = (max(own * before_s - passed_s, next_ * gone_s) for own, next_ in each)
+        return least_s, most_s
 
     def text(self, now_s: float) -> str:
         """One line."""
-        left_s = self.left_s(now_s)
-        left = f"about {_time(left_s)} left" if left_s >= 1.0 else "almost done"
-        return f"{self._stage.value}: {_time(now_s - self.begun_s)} gone, {left}"
+        left, gone = self.left_s(now_s), f"{self._stage.value}: {_time(now_s - self.begun_s)} gone"
+        if left is None:
+            return f"{gone}; how much is left shows after the search"
+        least, most = _time(left[0]), _time(left[1])
+        if left[1] < 1.0:
+            return f"{gone}, almost done"
+        return f"{gone}, {least} to {most} left" if least != most else f"{gone}, about {most} left"
 
 
 @contextmanager
-def stages_shown(
-    console: Console, samples: int, now_s: Callable[[], float] = time.monotonic
-) -> Generator[Callable[[Stage], None]]:
+def stages_shown(console: Console, now_s: Callable[[], float] = time.monotonic) -> Generator[Callable[[Stage], None]]:
     """Gives what a diagnosis calls when a stage begins."""
-    outlook = Outlook(now_s(), samples)
+    outlook = Outlook(now_s())
     with console.status(outlook.text(now_s())) as status:
         every_s = TERMINAL_S if console.is_terminal else LINE_S
 
@@ -92,11 +95,6 @@ def stages_shown(
 
         with in_thread(show, "progress"):
             yield lambda stage: outlook.enter(stage, now_s())
-
-
-def _share_before(stage: Stage) -> float:
-    order = list(Stage)
-    return sum(share for known, share in SHARES.items() if order.index(known) < order.index(stage))
 
 
 def _time(seconds: float) -> str:

@@ -72,7 +72,7 @@ def _brief(file: DiagnosisFile) -> Iterator[str]:
 
 
 def calibration_lines(answers: Answers, diagnosis: DiagnosisFile | None, kept: str) -> Iterator[str]:
-    """`kept`: why the model is the geometry alone; empty where it holds the physics found."""
+    """`kept`: which model was kept, and why."""
     judged = answers.verdict
     yield judged.sentence
     yield f"trust: {judged.trust.value}"
@@ -82,8 +82,20 @@ def calibration_lines(answers: Answers, diagnosis: DiagnosisFile | None, kept: s
         yield f"{number}. {one.says} (confidence {one.confidence:.2f})"
     if len(found) > CAUSES:
         yield f"and {len(found) - CAUSES} more causes: in the report"
-    yield f"the model is the geometry alone: {kept}" if kept else "the model holds the physics found"
+    yield kept
     yield from (f"to do: {advice}" for advice in judged.advice[:1])
+
+
+def unseen_words(file: DiagnosisFile) -> str:
+    """Of each way to leave rows out, what both models miss of them."""
+    several = len({split.instrument for split in file.splits}) > 1
+    each = ((split, *before_after(split)) for split in file.splits)
+    parts = (
+        f"{SPLITS.get(split.split, split.split)}{f', {split.instrument}' if several else ''}: {before} with the "
+        f"geometry alone, {after} with the physics"
+        for split, before, after in each
+    )
+    return f"unseen rows, rms of a coordinate: {'; '.join(parts)}"
 
 
 def _few(lines: list[str]) -> Iterator[str]:

@@ -5,14 +5,17 @@ Needs no device any more.
 
 from collections.abc import Generator, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
+
+from numpy.random import default_rng
 
 from acquisition.recording import Recording, read
 from acquisition.recording.output import OutputError
 from calibeam.console import Console
 from calibeam.outcome import PartialResult, interruption
 from calibeam.printing.identification import print_identification
-from calibeam.printing.results import calibration_lines, print_diagnosis
+from calibeam.printing.results import calibration_lines, print_diagnosis, unseen_words
 from calibeam.results.identification import (
     identify_session,
     refuse_undetermined,
@@ -32,6 +35,7 @@ from calibrate.report.session_report import session_answers, session_page
 from calibrate.report.workspace import session_arm, session_room
 
 NOW = "now"
+ALONE = "the model is the identified geometry alone"
 MODEL_NAME, DIAGNOSIS_NAME = "model.json", "diagnosis.json"
 
 
@@ -91,20 +95,20 @@ def _concluded(recording_path: Path, console: Console) -> Identification:
 def calibrate(recording: Recording, folder: Path, console: Console, *, verbose: bool = False) -> Identification:
     """Identifies, diagnoses, proves on unseen rows; writes model.json, diagnosis.json, report.html; prints ten lines.
 
-    The model has the physics found where unseen rows are predicted better with it, else the identified geometry alone.
+    The model has the physics found where the same unseen rows are predicted better with it for certain, else the
+    identified geometry alone.
     `verbose`: all that `identify` and `diagnose` print. DataError where nothing can be identified.
     """
     result = identify_session(recording)
     refuse_undetermined(result.status, result.estimates)
-    model = write_session_model(result, recording, folder / MODEL_NAME)
-    if verbose:
-        print_identification(console, result, session_evidence(recording, model), verbose=True)
-    diagnosis, with_physics, kept = write_session_diagnosis(recording, folder)
-    if verbose and diagnosis is not None:
-        print_diagnosis(console, diagnosis, verbose=True)
-    model = model if with_physics is None else with_physics
-    answers = write_recording_report(recording, model, folder / "report.html", diagnosis)
-    for line in (*calibration_lines(answers, diagnosis, kept), *_files(folder, diagnosis)):
+    identified = write_session_model(result, recording, folder / MODEL_NAME)
+    kept = write_session_diagnosis(recording, folder, identified)
+    answers = write_recording_report(recording, kept.model, folder / "report.html", kept.compared)
+    if verbose:  # every file stands before the first line: who reads may end early
+        print_identification(console, result, session_evidence(recording, identified), verbose=True)
+        if kept.diagnosis is not None:
+            print_diagnosis(console, kept.diagnosis, verbose=True)
+    for line in (*calibration_lines(answers, kept.diagnosis, kept.says), *_files(folder, kept.diagnosis)):
         console.print(line, markup=False, highlight=False)
     console.print(accuracy_of(answers), style="bold", markup=False, highlight=False)
     return result
@@ -131,22 +135,40 @@ def _folder_of(recording_path: Path) -> Path:
     return recording_path if recording_path.is_dir() else recording_path.parent
 
 
-def write_session_diagnosis(recording: Recording, folder: Path) -> tuple[DiagnosisFile | None, ModelFile | None, str]:
-    """Writes diagnosis.json, and model.json with the physics found in place of the identified geometry; or why not.
+@dataclass(frozen=True)
+class KeptModel:
+    """What stands in model.json, why, and the diagnosis as its file has it; None where there is too little for one."""
 
-    No diagnosis where there is too little for one.
+    model: ModelFile
+    says: str  # a sentence
+    diagnosis: DiagnosisFile | None
+    compared: DiagnosisFile | None  # with proofs against the identified geometry, for the report
+
+
+def write_session_diagnosis(recording: Recording, folder: Path, identified: ModelFile) -> KeptModel:
+    """Writes diagnosis.json, and model.json with the physics found in place of the `identified` geometry where that
+    predicts the same unseen rows better for certain.
     """
-    from calibeam.results.diagnosis import diagnose_to_file  # a report starts without it
+    from calibeam.results.diagnosis import SEED, diagnose_to_file  # a report starts without it
 
     try:
         found, file = diagnose_to_file(recording, folder / DIAGNOSIS_NAME)
     except DataError as why:
-        return None, None, f"no diagnosis: {why}"
-    if no_better := no_better_with_physics(file):
-        return file, None, no_better
+        return KeptModel(identified, f"{ALONE}: no diagnosis: {why}", None, None)
+    if not any(one.stream is None for one in file.findings):
+        return KeptModel(identified, f"{ALONE}: {no_better_with_physics(file)}", file, file)
+    from calibrate.report.unseen_by_both import compared_on_unseen_rows  # with all of a search
+
+    try:
+        compared, why_not = compared_on_unseen_rows(recording, identified, found, file, default_rng(SEED)), ""
+    except DataError as why:
+        compared, why_not = file, f"; beside the geometry of the diagnosis, since {why}"
+    numbers = unseen_words(compared) + why_not
+    if no_better := no_better_with_physics(compared):
+        return KeptModel(identified, f"{ALONE}: {no_better}: {numbers}", file, compared)
     try:
         model = model_of_diagnosis(found, recording)
     except DataError as why:
-        return file, None, str(why)
+        return KeptModel(identified, f"{ALONE}: {why}", file, compared)
     write_model(folder / MODEL_NAME, model)
-    return file, model, ""
+    return KeptModel(model, f"the model holds the physics found: {numbers}", file, compared)

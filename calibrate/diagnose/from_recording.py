@@ -38,7 +38,7 @@ from calibrate.diagnose.stages import (
 from calibrate.diagnose.state.fitted import Fitted, fit_geometry
 from calibrate.diagnose.state.noise_of_fit import freedom
 from calibrate.diagnose.state.session import Session, session_of
-from calibrate.fit.identify.session import columns_of
+from calibrate.fit.identify.session import about_of, columns_of
 from calibrate.model.checks.gross_error import GrossError, GrossErrorKind, err_alike, postures
 from calibrate.model.effects.catalogue import missing_of
 from calibrate.model.effects.term import Missing
@@ -142,8 +142,7 @@ def _another_arm(geometry: Fitted) -> GrossError | None:
 
     Of readings that are lengths before the arm; spots on a detector are smaller than that, whatever is wrong.
     """
-    flange = geometry.around.frames[:, -1, :3, 3]
-    reach_m = float(np.max(np.linalg.norm(flange - geometry.around.frames[:, 0, :3, 3], axis=1)))
+    reach_m = _reach_m(geometry)
     for unseen in geometry.held_out(geometry.active):
         away_m = float(np.median(np.linalg.norm(unseen.misfit[:, :3], axis=1)))
         if unseen.instrument != ENCODER_DIFFERENCE and away_m > limits.FAR_OF_REACH * reach_m:
@@ -154,6 +153,31 @@ def _another_arm(geometry: Fitted) -> GrossError | None:
             remedy = "check the table, the order and signs of the joints, the units, and whether rows belong together"
             return GrossError(GrossErrorKind.ANOTHER_ARM, (), "rig file, arm", what, remedy)
     return None
+
+
+def _reach_m(geometry: Fitted) -> float:
+    """From the base to the farthest that the flange, or a point on it that is measured, came from there.
+
+    A single joint, or a wrist, reaches by its tool alone.
+    """
+    base, flange = geometry.around.frames[:, 0], geometry.around.frames[:, -1]
+    own_m = np.stack([np.zeros(3), *_points_m(geometry)])
+    points = np.einsum("nij,kj->nki", flange[:, :3, :3], own_m) + flange[:, None, :3, 3]
+    return float(np.max(np.linalg.norm(points - base[:, None, :3, 3], axis=2)))
+
+
+def _points_m(geometry: Fitted) -> list[Floats]:
+    """(3,) each in the flange: laser, tool and targets, where the fit has put them."""
+    rig, about = geometry.session.rig, about_of(geometry.session.weighting)
+    values = {p.name: v for p, v in zip(geometry.session.parameters, geometry.geometry.tolist(), strict=True)}
+    drawn = {"tool": rig.tool.point_m} | {f"target{k}": target.point_m for k, target in rig.targets.items()}
+    stated = {name: about.get(name, point_m) for name, point_m in drawn.items()}
+    found = [
+        np.array(point_m[:3]) + [values.get(f"{name}.{axis}", 0.0) for axis in "xyz"]
+        for name, point_m in stated.items()
+        if point_m is not None
+    ]
+    return found if rig.tool.laser_origin_m is None else [*found, np.array(rig.tool.laser_origin_m)]
 
 
 def unfinished(diagnosis: Diagnosis, failed: tuple[Incomplete, ...]) -> Diagnosis:

@@ -31,8 +31,9 @@ from calibrate.errors import DataError
 from calibrate.model.effect_records import EffectRecord, SessionRecord, check_physics
 from calibrate.model.older_models import with_present_names
 from calibrate.model.parameters import Parameter
-from calibrate.model.sensors.catalogue import BY_NAME, FRAMES
+from calibrate.model.sensors.catalogue import BY_NAME, FRAMES, kind_of
 from calibrate.model.torque_records import TorquesOfModel
+from calibrate.quantities import angle, length
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
@@ -223,6 +224,22 @@ class ModelFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             sizes = (6,) if name == "device" else (3, 6) if name == "tool" else (own,)
             if len(numbers) not in sizes:
                 raise ValueError(f"about.{shown(name)} holds {len(numbers)} numbers instead of {max(sizes)}")
+
+
+DIFFERS = 1e-3  # of the rms that a fit leaves: more is no rounding of a file
+ROUNDING = 1e-9  # m or rad: exact readings leave next to nothing
+NOT_AS_FITTED = "Read from its file, the model misses "
+
+
+def not_as_fitted(name: str, fitted: float, found: float) -> str:
+    """A sentence where a model as read from its file leaves another rms of an instrument's readings in its own session
+    than its fit has left (m or rad); nothing where the two agree.
+    """
+    if abs(found - fitted) <= DIFFERS * fitted + ROUNDING:
+        return ""
+    kind = kind_of(name)
+    says = length if kind.quantities[0].unit == "m" else angle
+    return f"{NOT_AS_FITTED}{kind.noun} of its own session by {says(found, 4)}, and the fit left {says(fitted, 4)}."
 
 
 def write_model(path: Path, model: ModelFile) -> None:

@@ -19,6 +19,7 @@ from acquisition.recording.rig import parse_rig
 from calibrate.apply.correct.mounting import Mounting, mounting
 from calibrate.apply.predicting import flange_with_physics, placed
 from calibrate.errors import DataError
+from calibrate.model.arms.coupled_readings import by_reading, recoupled
 from calibrate.model.arms.rig_arm import RigArm
 from calibrate.model.model_file import ModelFile
 from calibrate.model.placement import point_by_twist
@@ -236,7 +237,8 @@ class Arms:
             stated, real = np.eye(4), flange.T.copy()
             stated[:3, 3] = drawn.point_m
             real[:3, 3] = predictor.tip_at(np.eye(4)[None])[0]
-        low, high = (table.min(axis=1), table.max(axis=1)) if whole else (None, None)
+        read = recoupled(by_reading(rig.arm), table.T) if whole else table
+        low, high = (read.min(axis=0), read.max(axis=0)) if whole else (None, None)
         return cls(model, drawn, geometric, flange, stated, real, low, high)
 
     @property

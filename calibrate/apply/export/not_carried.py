@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from acquisition.recording import Samples
 from calibrate.errors import DataError
 from calibrate.model.alignment import aligned_difference
+from calibrate.model.effects.conditions import recoupled_samples
 from calibrate.model.effects.ports import Perturbation
 from calibrate.model.model_file import ModelFile
 from calibrate.model.predict import Predictor
@@ -80,7 +81,8 @@ def not_carried(model: ModelFile, carried: tuple[str, ...] = ()) -> NotCarried:
     cannot be evaluated.
     """
     predictor = Predictor.of(model)
-    recorded = recorded_samples(model, len(predictor.rig.arm.joints))
+    kept = recorded_samples(model, len(predictor.rig.arm.joints))
+    recorded = recoupled_samples(predictor.rig.arm, kept)
     session = tuple(e.name for e in model.effects if e.holds == "session")
     try:
         return _over(model, predictor, _drawn(recorded), session, carried, workspace=True)

@@ -6,6 +6,7 @@ from calibrate.diagnose.assess.detection_limits import Isolability, Smallest, is
 from calibrate.diagnose.assess.diagnosis import Finding, Named, Verdict
 from calibrate.diagnose.assess.findings import named
 from calibrate.diagnose.assess.stated_noise import Statement
+from calibrate.diagnose.assess.unseen_rows import proofs
 
 __all__ = [
     "Finding",
@@ -16,5 +17,6 @@ __all__ = [
     "Verdict",
     "isolability",
     "named",
+    "proofs",
     "smallest_visible",
 ]

@@ -7,6 +7,7 @@ Which samples a proof leaves out: at random, each place in turn, the end of the 
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Protocol, Self
 
 import numpy as np
 from numpy.random import Generator
@@ -14,9 +15,11 @@ from numpy.typing import NDArray
 
 from calibrate.diagnose.assess import limits
 from calibrate.diagnose.state.linearised import State, UnseenMisfits, tame
+from calibrate.errors import DataError
 from calibrate.fit.held_out import Split, by_place, last_block
 from calibrate.model.effects.drivers import Drivers
 from calibrate.model.effects.gravity import point_of
+from calibrate.model.effects.term import Accepted
 from calibrate.model.sensors.encoder_difference import NAME as ENCODER_DIFFERENCE
 
 Ints = NDArray[np.intp]
@@ -122,8 +125,24 @@ class Floor:
     source: str
 
 
-def proofs(bare: State, full: State, samples: Ints, rng: Generator) -> tuple[HeldOutProof, ...]:
-    """Every split that the session allows, every instrument; states without and with terms, fitted to all samples."""
+class Provable(Protocol):
+    """What a proof asks of a model; a State has it."""
+
+    @property
+    def drivers(self) -> Drivers: ...
+
+    def select(self, samples: Ints) -> Self: ...
+
+    def refitted(self, accepted: Sequence[Accepted]) -> Self: ...
+
+    def held_out(self, samples: Ints) -> tuple[UnseenMisfits, ...]: ...
+
+
+def proofs(bare: Provable, full: State, samples: Ints, rng: Generator) -> tuple[HeldOutProof, ...]:
+    """Every split that the session allows, every instrument; states without and with terms, fitted to all samples.
+
+    DataError where the two predict other observations.
+    """
     out: list[HeldOutProof] = []
     for split in splits_of(bare.drivers, samples, rng):
         out += _proof(bare, full, samples, split, rng)
@@ -154,7 +173,7 @@ def floors(state: State, samples: Ints, parameters: int) -> tuple[Floor, ...]:
     return tuple(out)
 
 
-def _proof(bare: State, full: State, samples: Ints, split: Split, rng: Generator) -> list[HeldOutProof]:
+def _proof(bare: Provable, full: State, samples: Ints, split: Split, rng: Generator) -> list[HeldOutProof]:
     before: list[UnseenMisfits] = []
     after: list[UnseenMisfits] = []
     for fold in split.unseen:
@@ -174,7 +193,11 @@ def _lengths(unseen: Sequence[UnseenMisfits]) -> list[UnseenMisfits]:
 def _compared(
     split: str, name: str, before: Sequence[UnseenMisfits], after: Sequence[UnseenMisfits], labels: Ints, rng: Generator
 ) -> HeldOutProof:
+    if [u.instrument for u in before] != [u.instrument for u in after]:
+        raise DataError("the two models predict other instruments")
     mine = [(b, a) for b, a in zip(before, after, strict=True) if b.instrument == name]
+    if not all(np.array_equal(b.sample, a.sample) for b, a in mine):
+        raise DataError(f"the two models predict other rows of {name}")
     good = np.concatenate([tame(a.whitened, 1.0) for _, a in mine])
     b = np.concatenate([u.misfit[:, :POSITION] for u, _ in mine])[good]
     a = np.concatenate([u.misfit[:, :POSITION] for _, u in mine])[good]

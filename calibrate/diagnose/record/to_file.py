@@ -117,7 +117,7 @@ def _with_physics(physics: Physics, rig: RigRecord, gross_errors: tuple[GrossErr
         noise_floor_source="" if floor is None else floor.source,
         noise_wanders=said.noise_wanders,
         also_unexplained=tuple(u for u in others if u is not None),
-        splits=tuple(map(_split, said.proofs)),
+        splits=tuple(map(split_record, said.proofs)),
         floors=tuple(map(_floor, said.floors)),
         free_space=None if change is None else FreeSpaceRecord(change.before_m, change.after_m, change.poses),
         lack_of_fit=None
@@ -184,7 +184,8 @@ def unexplained_record(found: Unexplained, rms_m: float | None) -> UnexplainedRe
     return UnexplainedRecord(found.where, ",".join(found.depends_on), size, found.share, found.p, found.why)
 
 
-def _split(proof: HeldOutProof) -> SplitRecord:
+def split_record(proof: HeldOutProof) -> SplitRecord:
+    """One proof as the file states it."""
     low, high = proof.removed
     before_m, after_m = _number(proof.rms_before_m), _number(proof.rms_after_m)
     return SplitRecord(

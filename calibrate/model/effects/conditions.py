@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from acquisition.recording import Samples
 from acquisition.recording.rig import Arm
 from acquisition.recording.samples import CONTROLLER, joint_of, per_joint
-from calibrate.model.arms.coupled_readings import by_reading, uncoupled
+from calibrate.model.arms.coupled_readings import by_reading
 from calibrate.model.effects.drivers import Conditions
 from calibrate.model.sensors.catalogue import SENSORS
 
@@ -55,18 +55,35 @@ def uncoupled_samples(arm: Arm, samples: Samples) -> Samples:
     matrix = by_reading(arm)
     if matrix is None:
         return samples
-    n, columns = samples.n_joints, dict(samples.columns)
-    for stem, unit in (("q", "_rad"), ("cmd", "_rad"), ("qd", "_rad_s"), ("last_move", "_rad")):
-        names = per_joint(stem, unit, n)
-        if all(name in samples for name in names):
-            read = np.stack([samples.column(name) for name in names], axis=1)
-            columns |= dict(zip(names, uncoupled(matrix, read).T, strict=True))
-    out = Samples(columns, n)
-    _, direction = moves_of(out)
-    for i in np.flatnonzero(np.any(matrix != np.eye(n), axis=1)):
+    out = _by_matrix(matrix, samples)
+    columns, (moves, direction) = dict(out.columns), moves_of(out)
+    turned = np.where(np.abs(moves) > MOVED_RAD, np.sign(moves), direction)
+    for i in np.flatnonzero(np.any(matrix != np.eye(out.n_joints), axis=1)):
         if (name := f"approach{i + 1}") in columns:
-            last = f"last_move{i + 1}_rad"
-            columns[name] = np.sign(columns[last]) if last in columns else direction[:, i]
+            columns[name] = turned[:, i]
+    return Samples(columns, out.n_joints)
+
+
+def recoupled_samples(arm: Arm, samples: Samples) -> Samples:
+    """Samples of `uncoupled_samples`, such as a model keeps, with angles, speeds and moves as the controller counts."""
+    matrix = by_reading(arm)
+    return samples if matrix is None else _by_matrix(np.asarray(np.linalg.inv(matrix), dtype=np.float64), samples)
+
+
+def _by_matrix(matrix: Floats, samples: Samples) -> Samples:
+    """Angles, commands, speeds and moves (row, joint) turned by a matrix (joint, joint).
+
+    A joint without the column, or a row without a value, counts as one that does what it was commanded and as it moved.
+    """
+    n, columns, q_rad = samples.n_joints, dict(samples.columns), samples.joints()
+    unrecorded = {"cmd": q_rad, "qd": np.zeros_like(q_rad), "last_move": moves_of(samples)[0]}
+    for stem, unit in (("q", "_rad"), ("cmd", "_rad"), ("qd", "_rad_s"), ("last_move", "_rad")):
+        names, empty = per_joint(stem, unit, n), np.full(len(samples), np.nan)
+        read = np.stack([samples.column(name) if name in samples else empty for name in names], axis=1)
+        known = np.isfinite(read)
+        turned = np.where(known, read, unrecorded.get(stem, q_rad)) @ matrix.T
+        turned[~known] = np.nan
+        columns |= {name: turned[:, i] for i, name in enumerate(names) if name in samples}
     return Samples(columns, n)
 
 

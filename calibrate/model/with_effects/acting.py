@@ -13,9 +13,10 @@ from scipy.spatial import KDTree
 
 from acquisition.recording import Samples
 from calibrate.errors import DataError
+from calibrate.model.arms.coupled_readings import by_reading, recoupled
 from calibrate.model.effect_records import EffectRecord
 from calibrate.model.effects.catalogue import EFFECTS
-from calibrate.model.effects.conditions import conditions_of, temperatures_of, uncoupled_samples
+from calibrate.model.effects.conditions import conditions_of, temperatures_of
 from calibrate.model.effects.curve import cause, curve
 from calibrate.model.effects.drivers import Drivers, Readout
 from calibrate.model.effects.gravity import likely_torque_nm
@@ -91,12 +92,16 @@ def frames_under(predictor: Predictor, q_rad: Floats, by: Perturbation) -> Float
 
 
 def drivers_under(predictor: Predictor, samples: Samples, by: Perturbation) -> Drivers:
-    """At all rows, as the model predicts them under a perturbation."""
-    frames = frames_under(predictor, samples.joints(), by)
+    """At all rows, as the model predicts them under a perturbation.
+
+    Joints of the samples are counted from the link in front, as a model keeps the conditions of its session.
+    """
+    matrix = by_reading(predictor.rig.arm)
+    frames = frames_under(predictor, recoupled(matrix, samples.joints()), by)
     place = {f"temp_{k}_degC": k for k in temperatures_of(samples)}
     as_recorded = {k: samples.column(c) for c, k in place.items()}  # smoothed already
-    taken, readouts = conditions_of(uncoupled_samples(predictor.rig.arm, samples), as_recorded), _readouts
-    return Drivers(**vars(taken), rig=predictor.rig, frames=frames, readouts=readouts(predictor, samples, frames, by))
+    taken, readouts = conditions_of(samples, as_recorded), _readouts(predictor, samples, frames, by)
+    return Drivers(**vars(taken), rig=predictor.rig, frames=frames, readouts=readouts)
 
 
 def acting(carried: Sequence[Carried], predictor: Predictor, recorded: Samples, both: Samples) -> tuple[Acting, ...]:

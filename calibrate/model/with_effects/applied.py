@@ -16,7 +16,7 @@ from acquisition.recording import Samples
 from acquisition.recording.samples import PLANE, SEAT, required
 from calibrate.errors import DataError
 from calibrate.model.effect_records import EffectRecord
-from calibrate.model.effects.conditions import MOVED_RAD, moves_of
+from calibrate.model.effects.conditions import MOVED_RAD, moves_of, uncoupled_samples
 from calibrate.model.effects.drivers import Drivers
 from calibrate.model.effects.loads import UNSTATED_CENTRE_M
 from calibrate.model.effects.payload_compliance import UNKNOWN_CENTRE
@@ -63,7 +63,10 @@ def needed_columns(depends_on: Iterable[str], recorded: Iterable[str]) -> tuple[
 
 
 def recorded_conditions(drivers: Drivers, samples: Samples) -> dict[str, Floats]:
-    """Column -> (sample,) of all that a session was taken under, as its effects were fitted to it."""
+    """Column -> (sample,) of all that a session was taken under, as its effects were fitted to it.
+
+    What is of joints is counted from the link in front, also where the controller counts otherwise.
+    """
     out: dict[str, Floats] = {"t_s": drivers.t_s} | _joints("q{}_rad", drivers.q_rad)
     out |= {name: samples.column(name) for name in USED_AS if name in samples}
     for stem, values in (
@@ -197,6 +200,7 @@ def effects_at(
     nothing = Perturbation.none(len(samples), samples.n_joints)
     if model.session is None or not used:
         return Applied(nothing, (), (), ("",) * len(samples), notes)
+    samples = uncoupled_samples(predictor.rig.arm, samples)
     recorded, of_load = _with_payload(recorded_samples(model, samples.n_joints), samples, used)
     notes = (*notes, *of_load)
     carried = listed(used, drivers_under(predictor, recorded, Perturbation.none(len(recorded), samples.n_joints)))
@@ -226,7 +230,10 @@ def effects_at(
 
 
 def recorded_samples(model: ModelFile, n_joints: int) -> Samples:
-    """The conditions of the model's session as a table. DataError where a column that every row has is missing."""
+    """The conditions of the model's session as a table, joints counted from the link in front.
+
+    DataError where a column that every row has is missing.
+    """
     given = {} if model.session is None else model.session.conditions
     table = {c: np.array(values, dtype=np.float64) for c, values in given.items()}
     for name in (*required(n_joints), *model.needs):

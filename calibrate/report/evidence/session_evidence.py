@@ -27,7 +27,7 @@ from calibrate.fit.weighting import Weighting
 from calibrate.model.arms.catalogue import arm_of
 from calibrate.model.chain import KinematicModel
 from calibrate.model.dual_psd_rig import dual_psd_chain
-from calibrate.model.model_file import ModelFile
+from calibrate.model.model_file import NOT_AS_FITTED, ModelFile, not_as_fitted
 from calibrate.model.observations import Observations, observations
 from calibrate.model.parameters import (
     Parameter,
@@ -107,8 +107,6 @@ def _strangers(recording: Recording, why: str) -> DataError:
 
 Indices = NDArray[np.intp]
 
-SAME = 1e-3  # of the rms in the model: beyond, the readings are not those that were fitted
-
 
 @dataclass(frozen=True)
 class Readings:
@@ -158,6 +156,7 @@ class SessionEvidence:
     arm: KinematicModel
     drawn: Floats  # (param,) the nominal arm, frames and target where they fit best
     theta: Floats  # (param,) as identified
+    not_as_fitted: tuple[str, ...] = ()  # sentences: the model as read misses its session otherwise than its fit
 
     @cached_property
     def rows(self) -> Indices:
@@ -219,14 +218,14 @@ def session_evidence(recording: Recording, model: ModelFile) -> SessionEvidence:
         r for i, m in enumerate(weighting.measured) for r in _readings(m, i, (recorded, before), (problem, theta))
     )
     rms = float(np.sqrt(np.mean(readings[0].error_after ** 2)))
-    if abs(rms - model.rms_distance_after_m) > SAME * model.rms_distance_after_m + 1e-12:
-        raise DataError(
-            f"report: the model has {length(model.rms_distance_after_m)} rms distance, but misses the "
-            f"{model.instruments[0]} rows of "
-            f"{recording.path.name} by {length(rms)}; give the model of this recording, or identify it again"
-        )
+    unlike = not_as_fitted(model.instruments[0], model.rms_distance_after_m, rms)
+    if unlike and model.made_of(recording.samples) is not True:
+        stated = f"it states {length(model.rms_distance_after_m, 4)} rms distance of {model.instruments[0]}"
+        raise _strangers(recording, f"{stated}, and misses these rows by {length(rms, 4)}")
+    stated = tuple(alarm for alarm in model.alarms if alarm.startswith(NOT_AS_FITTED))
     arm = weighting.measured[0].problem.chain.model
-    return SessionEvidence(recording, model, readings, problem.parameters, problem, arm, before, theta)
+    alarms = stated or tuple(filter(None, [unlike]))
+    return SessionEvidence(recording, model, readings, problem.parameters, problem, arm, before, theta, alarms)
 
 
 def _places_only(problem: JointProblem, model: ModelFile, theta: Floats) -> Floats:

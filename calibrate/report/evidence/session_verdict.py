@@ -168,6 +168,11 @@ def _proved(model: ModelFile, diagnosis: DiagnosisFile | None) -> tuple[SplitRec
 
 def _reasons(evidence: SessionEvidence) -> Iterator[ReasonForCare]:
     model, recording = evidence.model, evidence.recording
+    for says in evidence.not_as_fitted:
+        yield (
+            says,
+            "Report the difference with the recording; the numbers here are those of the file.",
+        )
     if model.status == Status.AT_BOUND.name:
         yield (
             f"{Status.AT_BOUND.value}.",

@@ -89,6 +89,63 @@ def test_an_arm_that_stays_far_off_its_readings_has_no_findings(recording):
     assert found.blunders[-1].whole_file
 
 
+def one_joint(folder, wave_rad, rows=80):
+    """A joint on a bench that carries a target 0.4 m off its axis, and turns by a wave more than it reads."""
+    rng = np.random.default_rng(5)
+    q = rng.uniform(-3.0, 3.0, rows)
+    turned = q + wave_rad * np.sin(2.0 * q)
+    seen = 0.4 * np.stack([np.cos(turned), np.sin(turned), np.zeros(rows)], axis=1)
+    seen = seen + np.array([1.0, 0.5, 0.01]) + rng.normal(0.0, 2e-5, (rows, 3))
+    folder.mkdir()
+    (folder / "rig.toml").write_text(ONE_JOINT)
+    lines = [
+        f"{k},{angle!r},{x!r},{y!r},{z!r}"
+        for k, (angle, (x, y, z)) in enumerate(zip(q.tolist(), seen.tolist(), strict=True))
+    ]
+    (folder / "samples.csv").write_text("\n".join(["t_s,q1_rad,x_m,y_m,z_m", *lines]) + "\n")
+    return read(folder)
+
+
+ONE_JOINT = """schema = 1
+name = "bench-joint"
+
+[arm]
+model = "local-poe"
+
+[[arm.joint]]
+origin_m = [0.0, 0.0, 0.0]
+rotation_rad = [0.0, 0.0, 0.0]
+lower_rad = -3.2
+upper_rad = 3.2
+
+[arm.flange]
+origin_m = [0.0, 0.0, 0.014]
+rotation_rad = [0.0, 0.0, 0.0]
+
+[tool]
+point_m = [0.4, 0.0, 0.0]
+
+[noise]
+position_m = 2e-5
+"""
+
+
+def test_a_single_joint_reaches_by_its_tool(tmp_path):
+    """Readings 2 mm beside it are far from its flange, which is 14 mm long, and near its target."""
+    recording = one_joint(tmp_path / "bench", wave_rad=8e-3)
+    found = diagnose_samples(recording.rig, recording.samples, np.random.default_rng(1))
+    assert [one.kind for one in found.blunders] == []
+    (largest, *_) = found.physics.diagnosis.findings
+    assert largest.name.where.startswith("joint1")
+
+
+def test_a_single_joint_whose_readings_are_another_ones_is_no_joint_of_this_rig(tmp_path):
+    recording = one_joint(tmp_path / "bench", wave_rad=0.05)
+    found = diagnose_samples(recording.rig, recording.samples, np.random.default_rng(1))
+    assert found.blunders[-1].kind is GrossErrorKind.ANOTHER_ARM
+    assert "reach of 0.4" in found.blunders[-1].says
+
+
 def test_readings_that_err_one_after_another_are_no_gross_errors_of_single_readings(tmp_path):
     """Neither rule has a name for what stood elsewhere for a while: the session is not consistent for all that."""
     recording = recording_of(tmp_path, family="tracker", seed=33, samples=120, arm="irb120")

@@ -10,15 +10,17 @@ import pytest
 
 from acquisition.recording import RecordingError
 from acquisition.recording.rig import parse_rig
+from acquisition.recording.samples import measured_sha256, readings_sha256
 from calibrate.errors import DataError
 from calibrate.model.model_file import ModelFile
 from calibrate.report.elements.html import write_page
+from calibrate.report.elements.verdict import Trust
 from calibrate.report.evidence.session_evidence import session_evidence
 from calibrate.report.sections.arm_errors import errors_chapter
 from calibrate.report.sections.parameter_tables import parameters_chapter
 from calibrate.report.sections.proofs import proofs_chapter
 from calibrate.report.sections.recorded_data import data_chapter
-from calibrate.report.session_report import session_answers
+from calibrate.report.session_report import session_answers, session_page
 from calibrate.report.workspace.workspace_errors import session_arm
 
 NEWER = ("alarms", "proofs", "unproven", "observability", "free_space", "bootstrap", "plan")
@@ -170,6 +172,22 @@ def test_the_model_of_other_values_is_refused(arm_session):
     columns["x_m"][::2] += 1e-3
     with pytest.raises(DataError, match="give the model of this recording"):
         session_evidence(session.recording(columns), session.model(recording))
+
+
+def test_a_model_whose_file_differs_from_its_fit_has_a_report_with_both_numbers(arm_session):
+    session = arm_session()
+    recording = session.recording(session.positions())
+    samples, found = recording.samples, session.model(recording)
+    made_of = {"readings_sha256": readings_sha256(samples), "measured_sha256": measured_sha256(samples)}
+    model = msgspec.structs.replace(found, **made_of)
+    known = session_evidence(recording, model)
+    assert known.not_as_fitted == ()
+    other = msgspec.structs.replace(model, rms_distance_after_m=0.99 * model.rms_distance_after_m)
+    judged = session_answers(session_evidence(recording, other)).verdict
+    assert judged.trust is not Trust.GOOD
+    assert judged.reasons[0].startswith("Read from its file, the model misses positions of its own session by ")
+    page = " ".join(text_of(session_page(session_evidence(recording, other))).split())
+    assert " ".join(judged.reasons[0].split()) in page
 
 
 def test_a_place_that_cannot_be_written_is_named(page, tmp_path):

@@ -11,7 +11,7 @@ from calibrate.model.arms.catalogue import arm_of
 from calibrate.model.arms.convert import convert, corrected_parts, flange_of_parts
 from calibrate.model.arms.link_tolerance import FREE
 from calibrate.model.arms.rig_arm import RigArm
-from calibrate.model.effects.conditions import conditions_of, uncoupled_samples
+from calibrate.model.effects.conditions import conditions_of, recoupled_samples, uncoupled_samples
 from calibrate.model.effects.loads import stated_masses
 
 RNG = np.random.default_rng(8)
@@ -150,3 +150,29 @@ def test_drives_see_a_coupled_joint_from_the_link_in_front():
     np.testing.assert_allclose(seen.q_rad[:, 2], q_rad[:, 1] + q_rad[:, 2])
     np.testing.assert_array_equal(seen.approach[1:, 2], np.sign(np.diff(q_rad[:, 1] + q_rad[:, 2])))
     np.testing.assert_array_equal(seen.approach[:, 3], 1.0)
+
+
+def test_a_command_of_the_coupled_joint_alone_is_as_far_off_its_reading_as_recorded():
+    _, counted = rigs("dh", (), (3, 2, 1.0))
+    q_rad, off_rad = readings(8), 1e-3
+    columns = {f"q{i + 1}_rad": q_rad[:, i] for i in range(6)} | {
+        "t_s": np.arange(8.0),
+        "cmd3_rad": q_rad[:, 2] + off_rad,
+    }
+    samples = Samples(columns, 6)
+    inner = uncoupled_samples(counted.arm, samples)
+    seen = conditions_of(inner, {})
+    np.testing.assert_allclose(seen.cmd_minus_q_rad[:, 2], off_rad, atol=1e-12)
+    again = recoupled_samples(counted.arm, inner)
+    for name, values in columns.items():
+        np.testing.assert_allclose(again.column(name), values, atol=1e-12, err_msg=name)
+
+
+def test_a_row_without_a_command_leaves_those_of_other_joints():
+    _, counted = rigs("dh", (), (3, 2, 1.0))
+    q_rad = readings(8)
+    columns = {f"q{i + 1}_rad": q_rad[:, i] for i in range(6)} | {"t_s": np.arange(8.0)}
+    columns |= {f"cmd{i + 1}_rad": q_rad[:, i] + 1e-3 for i in range(6)}
+    columns["cmd5_rad"] = np.full(8, np.nan)
+    seen = conditions_of(uncoupled_samples(counted.arm, Samples(columns, 6)), {}).cmd_minus_q_rad
+    np.testing.assert_allclose(seen, np.tile([1e-3, 1e-3, 2e-3, 1e-3, 0.0, 1e-3], (8, 1)), atol=1e-12)
