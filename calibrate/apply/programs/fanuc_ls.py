@@ -22,10 +22,12 @@ from calibrate.apply.programs.literal import (
 
 POSITION = re.compile(r"P\[\s*(?P<number>\d+)[^\]]*\]\s*\{(?P<body>[^}]*)\}")
 FIELD = re.compile(rf"\b(?P<key>X|Y|Z|W|P|R|J[1-9])\s*=\s*(?P<number>{NUMBER})\s*(?P<unit>mm|deg)")
+EXTERNAL = re.compile(rf"\bE(?P<n>[1-9])\s*=\s*(?P<number>{NUMBER})\s*(?:mm|deg)")
 FRAMES = (("UF", re.compile(r"UF\s*:\s*(?P<n>\w+)")), ("UT", re.compile(r"UT\s*:\s*(?P<n>\w+)")))
 GROUP = re.compile(r"\bGP(?P<n>\d+)\s*:(?P<fields>(?:(?!\bGP\d)[^}])*)")
 # The end of an arc of C stands in a line of its own.
 MOVE = re.compile(r"^[ \t]*(?:\d*:\s*[JLCA]|:)\s+(?P<register>PR?)\[\s*(?P<number>\d*)", re.MULTILINE)
+MOTION = re.compile(r"^[ \t]*(?P<go>\d*:[ \t]*[JLCAS][ \t]+\S)", re.MULTILINE)
 MOVED = re.compile(r"\b(?:V?OFFSET|TOOL_OFFSET|INC|COORD|RTCP)\b", re.IGNORECASE)
 POSE = ("X", "Y", "Z", "W", "P", "R")
 
@@ -74,7 +76,9 @@ def _literal(text: str, match: re.Match[str], moves: tuple[Move, ...], n_joints:
     joints, fields = whole["1"]
     frame, tool = (_place(what, pattern.search(text, *parts["1"])) for what, pattern in FRAMES)
     spans, values = tuple(field.span("number") for field in fields), tuple(float(field["number"]) for field in fields)
-    return Literal(f"P[{match['number']}]", parts["1"][0], spans, values, joints, moves, own=(frame, tool))
+    axes = tuple((f"E{axis['n']}", float(axis["number"])) for axis in EXTERNAL.finditer(text, *parts["1"]))
+    name = f"P[{match['number']}]"
+    return Literal(name, parts["1"][0], spans, values, joints, moves, own=(frame, tool), external=axes)
 
 
 def _numbers(text: str, part: tuple[int, int], n_joints: int) -> tuple[bool, list[re.Match[str]]] | None:
@@ -95,4 +99,4 @@ def _place(what: str, found: re.Match[str] | None) -> NamedPose:
     return NamedPose(f"{what} {found['n']}", np.eye(4) if found["n"] == "0" else None)
 
 
-FANUC_LS = Dialect("FANUC LS", "FANUC", (".ls",), find, FANUC, True, 3, 3, None)
+FANUC_LS = Dialect("FANUC LS", "FANUC", (".ls",), find, FANUC, True, 3, 3, None, MOTION, "!")
