@@ -18,8 +18,8 @@ from calibrate.apply.programs.literal import (
 )
 
 LINE = re.compile(r"line (\d+)\b")
-LISTED = 3  # reasons in one error
-LONGEST_SHOWN = 100  # letters of an instruction
+LISTED = 1  # reasons in one error, which has room for few
+LONGEST_SHOWN = 40  # letters of an instruction
 
 
 def examined(targets: Targets, text: str, dialect: Dialect, joint_targets: bool) -> Targets:
@@ -46,7 +46,7 @@ def nothing_corrected(targets: Targets, text: str, dialect: Dialect) -> str:
     first = min(lines, default=0)
     held = "no motion instruction is in it"
     if lines:
-        held = f"{len(lines)} motion instructions are in it, the first in line {first}: {lines[first]}"
+        held = f"{len(lines)} motion instructions are in it, first in line {first}: {lines[first]}"
     return "; ".join([f"no target of {dialect.name} that could be corrected", held, *_reasons(targets)])
 
 
@@ -58,8 +58,14 @@ def nothing_but_joints(targets: Targets, count: int) -> str:
 
 
 def _reasons(targets: Targets) -> list[str]:
-    more = len(targets.skipped) - LISTED
-    return [*targets.skipped[:LISTED], *([f"{more} more"] if more > 0 else [])]
+    found = sorted(targets.skipped, key=_line)
+    more = len(found) - LISTED
+    return [*found[:LISTED], *([f"and {more} more"] if more > 0 else [])]
+
+
+def _line(sentence: str) -> int:
+    """0 for a sentence on the whole file."""
+    return int(match[1]) if (match := LINE.match(sentence)) else 0
 
 
 def _motion_lines(text: str, dialect: Dialect) -> dict[int, str]:
@@ -75,7 +81,8 @@ def _unread_motion(targets: Targets, text: str, dialect: Dialect) -> Iterator[st
     listed = [LINE.match(sentence) for sentence in targets.skipped]
     if not targets.literals and not all(listed):  # the whole file is refused
         return
-    read = {line_of(text, move.line_start) for one in targets.literals for move in one.moves}
+    moves = [*targets.moves, *(move for one in targets.literals for move in one.moves)]
+    read = {line_of(text, move.line_start) for move in moves}
     read |= {int(match[1]) for match in listed if match}
     for line, instruction in _motion_lines(text, dialect).items():
         if line not in read:

@@ -52,16 +52,19 @@ def find(text: str, n_joints: int) -> Targets:
         else:
             by_number.setdefault(match["number"], []).append(move)
     literals: list[Literal] = []
+    idle: list[Move] = []
     for match in POSITION.finditer(text, body):
         moves = tuple(by_number.pop(match["number"], ()))
         one = _literal(text, match, moves, n_joints)
         if isinstance(one, str):
             skipped.append((match.start(), f"P[{match['number']}]: {one}; not corrected"))
+            idle += moves
         elif moves or match["number"] not in left:
             literals.append(one)
     absent = ((move.line_start, number) for number, moves in by_number.items() for move in moves)
     skipped += [(at, f"P[{number}] is not in this file") for at, number in absent]
-    return Targets(tuple(literals), tuple(dict.fromkeys(f"line {line_of(text, at)}: {why}" for at, why in skipped)))
+    sentences = dict.fromkeys(f"line {line_of(text, at)}: {why}" for at, why in skipped)
+    return Targets(tuple(literals), tuple(sentences), moves=tuple(idle))
 
 
 def _literal(text: str, match: re.Match[str], moves: tuple[Move, ...], n_joints: int) -> Literal | str:

@@ -88,6 +88,7 @@ class Targets:
     skipped: tuple[str, ...]
     absent: tuple[str, ...] = ()  # sentences about routines that are called and are not in the file
     external: Axes = ()  # of aggregates that are no literal
+    moves: tuple[Move, ...] = ()  # to targets that are `skipped`
 
 
 @dataclass(frozen=True)

@@ -93,6 +93,27 @@ FORMS = (
         {8: "chosen while the program runs"},
     ),
     Form(
+        "car body line, controller in German",
+        program(
+            "  13:  TRAGLST[2] ;\n  14:J P[1] 100% CNT100 ACC100 ZEIT VOR   0.00sek,P-SPS    ;\n"
+            "      1:  FB-PSPS (E[41] [&] M[30]) ;\n       ------ ;\n  15:L P[2] 2000mm/sek CNT0 ACC100    ;\n",
+            fanuc(0),
+            fanuc(1),
+        ).replace("CONFIG : 'N U T", "KONFIG : 'N D B"),
+        (0, 1),
+    ),
+    Form(
+        "TP+ compiler: lines without numbers, positions with names, one that was never taught",
+        program(
+            " : J P[1:home] 10% FINE ;\n : L P[2:weld] 100mm/sec FINE ;\n : L P[3] 9mm/sec FINE ;\n",
+            fanuc(0),
+            fanuc(1),
+            "X = ********  mm,\tY = ********  mm,\tZ = ********  mm,\n\tW = ******** deg,\tP = ******** deg",
+        ).replace("P[2]{", 'P[2:"Weld"]{'),
+        (0, 1),
+        {22: "not a whole position"},
+    ),
+    Form(
         "arc: the end in a line of its own, user frame",
         program(
             "   1:L P[1] 50mm/sec FINE    ;\n   2:C P[2]    \n    :  P[3] 50mm/sec FINE    ;\n",
@@ -128,7 +149,7 @@ BESIDE = {
     ),
     "moves to registers only": (
         program("   1:J PR[1:HOME] 100% FINE    ;\n   2:L PR[2] 100mm/sec FINE    ;\n"),
-        "2 motion instructions are in it, the first in line 6: 1:J PR[1:HOME] 100% FINE ;",
+        "2 motion instructions are in it, first in line 6: 1:J PR[1:HOME] 100% FINE ;",
     ),
 }
 

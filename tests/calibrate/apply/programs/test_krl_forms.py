@@ -1,9 +1,15 @@
 """Forms of motion in KRL as taught programs, post-processors and generators write them."""
 
+from pathlib import Path
+
+import numpy as np
 import pytest
 
+from calibeam.cli import run
 from calibrate.errors import DataError
-from tests.calibrate.apply.programs.forms import TABLE, Form, assert_form, corrected, frame_of, kuka, turns
+from calibrate.model.model_file import write_model
+from tests.calibrate.apply.correct.six_joints import model
+from tests.calibrate.apply.programs.forms import TABLE, Form, Q, assert_form, corrected, frame_of, kuka, turns
 
 POINTS = "".join(
     f"DECL E6POS XP{i}={{{kuka(i, TABLE, turns(i))},E1 0.0,E2 0.0}}\n"
@@ -81,6 +87,19 @@ FORMS = (
         {5: "no literal"},
     ),
     Form(
+        "course notes: position that the program assigns",
+        f"BAS(#BASE,0)\nE6POS MY_POSITION\nLIN {{{kuka(0)}}}\nMY_POSITION = {{{kuka(1)}}}\nLIN MY_POSITION\n",
+        (0,),
+        {5: "no literal"},
+    ),
+    Form(
+        "RoboDK post for KUKA: base on an external axis by its number",
+        f"$BASE = $NULLFRAME\nLIN {{{kuka(0)}}}\n"
+        f"$BASE=EK(EX_AX_DATA[1].ROOT,EX_AX_DATA[1].EX_KIN, {{{frame_of(TABLE)}}})\nLIN {{{kuka(1, TABLE)}}}\n",
+        (0,),
+        {4: "carried by external axes"},
+    ),
+    Form(
         "filament winding: relative move",
         f"BAS(#BASE,0)\nLIN {{{kuka(0)}}}\nLIN_REL {{Z 10}} C_DIS\n",
         (0,),
@@ -142,7 +161,39 @@ def test_a_program_without_a_target_that_can_be_corrected_is_described() -> None
     with pytest.raises(DataError) as caught:
         corrected(f"DEF a()\n{HOME}LIN_REL {{Z 5}}\nEND\n", ".src")
     says = str(caught.value)
-    assert "2 motion instructions are in it, the first in line 2: SPTP XHOME WITH" in says
+    assert "2 motion instructions are in it, first in line 2: SPTP XHOME WITH" in says
     assert "no literal" in says
     with pytest.raises(DataError, match="no motion instruction is in it"):
         corrected("DEF a()\n; LIN XP1\nEND\n", ".src")
+
+
+SRC = "DEF weld( )\n" + AXES.format(0) + LINE.format(1) + LINE.format(2) + "END"  # some end without a line break
+
+
+def given(folder: Path, src: str, dat: str) -> list[str]:
+    write_model(folder / "model.json", model())
+    (folder / "weld.src").write_text(src)
+    (folder / "weld.dat").write_text(dat)
+    command = ["correct", str(folder / "model.json"), str(folder / "weld.src"), "--out", str(folder / "new.src")]
+    return [*command, "--tool", *"000000", "--start", *map(str, np.degrees(Q[0]))]
+
+
+def test_a_program_and_its_data_list_of_kss_8_5_are_corrected_together(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    dat = f"DEFDAT weld\n{DATA}{POINTS}ENDDAT\n"
+    assert run(given(tmp_path, SRC, dat)) == 0
+    assert "3 of 3 poses corrected" in capsys.readouterr().out
+    assert (tmp_path / "new.src").read_text() == SRC
+    was, new = dat.splitlines(), (tmp_path / "new.dat").read_text().splitlines()
+    assert [a.split("=")[0] for a, b in zip(was, new, strict=True) if a != b] == [f"DECL E6POS XP{i}" for i in range(3)]
+
+
+def test_an_error_counts_the_lines_of_a_data_list_from_its_own_beginning(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    dat = f"DEFDAT weld\n{DATA}{POINTS.replace('E1 0.0', 'E1 2150.0')}ENDDAT\n"
+    assert run(given(tmp_path, SRC, dat)) == 1
+    says = " ".join(capsys.readouterr().err.split())
+    assert "3 motion instructions are in it, first in line 2" in says
+    assert "weld.dat line 4: XP0: external axis E1 is at 2150" in says

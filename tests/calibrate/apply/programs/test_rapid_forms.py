@@ -153,7 +153,7 @@ def test_the_real_arm_reaches_the_targets_of_rapid_forms_and_the_rest_is_listed(
 BESIDE = {  # text, reason in the error
     "IRB 4600 on a track, COMPAS RRC": (
         move(abb(0, "3399.99,9E9,9E9,9E9,9E9,9E9")) + move(abb(1, "3079.80,9E9,9E9,9E9,9E9,9E9")),
-        "line 2: external axis eax_a is at 3079.8: where it carries the arm or the part is not known; not corrected",
+        "line 1: external axis eax_a is at 3399.99: where it carries the arm or the part is not known",
     ),
     "YuMi with its seventh axis": (
         declared(abb(0, "-101.614,9E+9,9E+9,9E+9,9E+9,9E+9")) + move("Target_10"),
@@ -165,11 +165,11 @@ BESIDE = {  # text, reason in the error
     ),
     "displaced": (
         f"PDispSet shift1;\n{move(abb(0))}{move(abb(1))}",
-        "line 3: the program displaces its targets",
+        "line 2: the program displaces its targets (PDispSet, PDispOn); not corrected; and 1 more",
     ),
     "a move of another module": (
         "MoveHome;\nMoveJ pOther,v50,fine,tool0;\n",
-        "1 motion instructions are in it, the first in line 2: MoveJ pOther,v50,fine,tool0;",
+        "1 motion instructions are in it, first in line 2: MoveJ pOther,v50,fine,tool0;",
     ),
 }
 

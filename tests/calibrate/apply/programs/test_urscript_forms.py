@@ -157,4 +157,4 @@ def test_a_posture_that_two_moves_ask_for_differently_is_the_nearest_to_the_one_
 def test_a_script_whose_motion_is_computed_is_described() -> None:
     with pytest.raises(DataError) as caught:
         corrected("def a():\n  # movel(x)\n  movel(over(2), a=1)\n  movej(q)\nend\n", ".script")
-    assert "2 motion instructions are in it, the first in line 3: movel(over(2), a=1)" in str(caught.value)
+    assert "2 motion instructions are in it, first in line 3: movel(over(2), a=1)" in str(caught.value)
