@@ -53,6 +53,7 @@ ARC_END = re.compile(rf"{ARC}{TARGET}", LINES)
 MOTION = re.compile(
     r"^[ \t]*(?P<go>(?:S?(?:PTP|LIN|CIRC)|SPL)(?:_REL)?)\b(?![ \t]*[=(])(?![ \t]+\$(?:AXIS|POS)_ACT\b)", LINES
 )
+AXIS_SET = re.compile(r"\w\.(?P<name>E[1-6])[ \t]*=(?!=)[ \t]*(?P<value>[^\n;]*)", re.IGNORECASE)
 RELATIVE = re.compile(rf"{GOES}_REL\s+{AGGREGATE}", LINES)
 OTHER = re.compile(rf"{GOES}_REL\b", LINES)
 ROUTINE = re.compile(r"^[ \t]*(?:GLOBAL\s+)?DEF(?:FCT\s+\w+)?\s+(?P<name>\w+)\s*\((?P<parameters>[^)]*)", LINES)
@@ -119,6 +120,7 @@ def find(text: str, n_joints: int) -> literal.Targets:
         elif one is not None:
             literals.append(one)
     external += [axis for match in RELATIVE.finditer(code) for axis in _external(text, match)]
+    external += [_axis(match) for match in AXIS_SET.finditer(code)]
     others = ((m.end(), f"{m.group().strip()}: relative moves are not corrected") for m in OTHER.finditer(code))
     skipped += literal.sentences(code, by_name, literals, CHANGED, others)
     absent = literal.absent(code, CALLED.finditer(code), ROUTINE, BUILT_IN, "sets $BASE or $TOOL")
@@ -155,11 +157,12 @@ def _literal(
 
 def _external(text: str, match: re.Match[str]) -> list[tuple[str, float]]:
     """External axes of an aggregate; NaN for one that is an expression."""
-    return [
-        (axis["name"].upper(), float(value) if re.fullmatch(literal.NUMBER, value) else np.nan)
-        for axis in EXTERNAL.finditer(text, *match.span("fields"))
-        for value in (axis["value"].strip(),)
-    ]
+    return [_axis(axis) for axis in EXTERNAL.finditer(text, *match.span("fields"))]
+
+
+def _axis(match: re.Match[str]) -> tuple[str, float]:
+    value = match["value"].strip()
+    return match["name"].upper(), float(value) if re.fullmatch(literal.NUMBER, value) else np.nan
 
 
 def _fields(text: str, begin: int, end: int) -> dict[str, tuple[literal.Span, float]]:

@@ -79,6 +79,7 @@ BUILT_IN = literal.built_in(rf"""
     TestSign\w+ WarmStart EGM\w+ Cam[A-Z]\w+""")
 MOTION = re.compile(rf"\b(?P<go>(?:Move[A-Z]|{PROCESS}|Search[JLC])\w*[ \t]*[\s\\\[])", re.IGNORECASE)
 EXTERNAL = tuple(f"eax_{letter}" for letter in "abcdef")
+AXES_SET = re.compile(r"\.extax\s*(?:\.\s*(?P<axis>eax_[a-f])\s*)?:=\s*(?P<value>[^;]*)", re.IGNORECASE)
 UNUSED = 8.9e9  # and above: 9E9 for an axis that is not there
 LONGEST = 400  # letters between the beginning of a move and its last target
 
@@ -103,8 +104,20 @@ def find(text: str, n_joints: int) -> literal.Targets:
     skipped = literal.sentences(code, by_name, literals, ASSIGNED, literal.unread(text, code, TARGET, literals))
     if n_joints != 6:
         return literal.Targets((), (*skipped, f"RAPID targets have six axes, this arm has {n_joints}"))
+    external = tuple(axis for match in AXES_SET.finditer(code) for axis in _axes_set(match))
     what = "displaces the program, or changes a work object or a tool"
-    return literal.Targets(tuple(literals), skipped, literal.absent(code, _calls(code), ROUTINE, BUILT_IN, what))
+    return literal.Targets(
+        tuple(literals), skipped, literal.absent(code, _calls(code), ROUTINE, BUILT_IN, what), external
+    )
+
+
+def _axes_set(match: re.Match[str]) -> literal.Axes:
+    """External axes that an assignment changes; NaN for one that is computed."""
+    names = (match["axis"].lower(),) if match["axis"] else EXTERNAL
+    values = [v.strip() for v in match["value"].strip().removeprefix("[").removesuffix("]").split(",")]
+    if len(values) != len(names) or not all(re.fullmatch(literal.NUMBER, v) for v in values):
+        return tuple((name, np.nan) for name in names)
+    return tuple((name, float(v)) for name, v in zip(names, values, strict=True) if abs(float(v)) < UNUSED)
 
 
 def _calls(code: str) -> Iterator[re.Match[str]]:

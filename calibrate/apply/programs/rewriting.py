@@ -120,7 +120,7 @@ def correct_program(
         raise DataError(f"{name}: a frame or tool has a number beyond {LENGTH_M / 1e3:g} km; correct it")
     wanted = _wanted(targets.literals, dialect, arms, base, near_rad, every)
     for row, joints_rad in _behind_joints(every_target, targets.literals, dialect):
-        wanted.near_rad[row] = joints_rad
+        wanted.near_rad[row] = wanted.near_rad[row] if targets.literals[row].near else joints_rad
     found = correct(model, replace(wanted, source=name), inverse_of, options)
     pieces, q_rad = list[tuple[int, int, str]](), found.q_rad.copy()
     in_base = inverse(base) @ found.T_base_tool

@@ -81,12 +81,6 @@ FORMS = (
         (0, 1),
     ),
     Form(
-        "rotary bed of a scanner: PTP of a computed position",
-        f"$BASE=$NULLFRAME\nLIN {{{kuka(0)}}}\napos = $AXIS_ACT\napos.E1 = 40\nPTP apos\n",
-        (0,),
-        {5: "no literal"},
-    ),
-    Form(
         "course notes: position that the program assigns",
         f"BAS(#BASE,0)\nE6POS MY_POSITION\nLIN {{{kuka(0)}}}\nMY_POSITION = {{{kuka(1)}}}\nLIN MY_POSITION\n",
         (0,),
@@ -135,6 +129,10 @@ BESIDE = {  # text, reason in the error
     "filament winding: relative moves of the mandrel": (
         f"BAS(#BASE,0)\nLIN {{{kuka(0)}}}\nLIN_REL {{Z 10, E1 360}} C_DIS\n",
         "external axis E1 is at 360 for other targets",
+    ),
+    "rotary bed of a scanner: PTP of a computed position": (
+        f"$BASE=$NULLFRAME\nLIN {{{kuka(0)}}}\napos = $AXIS_ACT\napos.E1 = 40\nPTP apos\n",
+        "line 2: external axis E1 is at 40 for other targets, and this one does not state it",
     ),
     "computed": (
         f"BAS(#BASE,0)\nLIN {{{kuka(0)},E1 angle+5}}\n",

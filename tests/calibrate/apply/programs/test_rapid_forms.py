@@ -113,6 +113,11 @@ FORMS = (
         (0,),
     ),
     Form(
+        "measuring cell: axes of a computed target that are not there",
+        HEAD + declared(abb(0)) + "pNew.extax:=[9e9,9e9,9e9,9e9,9e9,9e9];\n" + main(move("Target_10")),
+        (0,),
+    ),
+    Form(
         "gluing: output at the end of a move",
         HEAD + declared(abb(0)) + main("MoveLDO Target_10,v100,fine,gun,doClamp,1;\n"),
         (0,),
@@ -162,6 +167,10 @@ BESIDE = {  # text, reason in the error
     "home of a gantry": (
         "MoveAbsJ [[0,0,0,0,30,0],[12000,470.018,767.656,9E9,9E9,12000]],v50,fine,gun;\n" + move(abb(0)),
         "external axis eax_a is at 12000 for other targets, and this one does not state it",
+    ),
+    "plotter beside a bed on a track: axis that the program computes": (
+        declared(abb(0, ZERO)) + "Target_10.extax.eax_a:=nBed+50;\n" + move("Target_10"),
+        "Target_10: external axis eax_a moves: it is at 0 here, and computed for other targets",
     ),
     "displaced": (
         f"PDispSet shift1;\n{move(abb(0))}{move(abb(1))}",

@@ -42,6 +42,14 @@ FORMS = (
         (0, 1),
     ),
     Form(
+        "PolyScope 5 program: home by joints before a waypoint",
+        f"def weld():\n{waypoint(1, 5)}  movej({ur_joints(1)}, {FAST})\n  movej(get_inverse_kin({ur(5)}, "
+        f"qnear={ur_joints(5)}), {FAST})\n{solved(1)}end\n",
+        (5, 5),
+        kept=1,
+        near=True,
+    ),
+    Form(
         "camera cell: posture of the moment",
         f"movej(get_inverse_kin({ur(0)}, qnear=get_actual_joint_positions()), a=1.2, v=0.8)\n",
         (0,),
