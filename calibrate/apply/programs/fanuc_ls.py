@@ -28,7 +28,8 @@ GROUP = re.compile(r"\bGP(?P<n>\d+)\s*:(?P<fields>(?:(?!\bGP\d)[^}])*)")
 # The end of an arc of C stands in a line of its own.
 MOVE = re.compile(r"^[ \t]*(?:\d*:\s*[JLCA]|:)\s+(?P<register>PR?)\[\s*(?P<number>\d*)", re.MULTILINE)
 MOTION = re.compile(r"^[ \t]*(?P<go>\d*:[ \t]*[JLCAS][ \t]+\S)", re.MULTILINE)
-MOVED = re.compile(r"\b(?:V?OFFSET|TOOL_OFFSET|INC|COORD|RTCP)\b", re.IGNORECASE)
+# Controllers write the words in their language (WKZ_Offset), registers of an offset in one form.
+MOVED = re.compile(r"\b(?:\w*OFFSET|INC|COORD|RTCP)\b|(?<=,)[PV]R\b(?!\s*=)", re.IGNORECASE)
 POSE = ("X", "Y", "Z", "W", "P", "R")
 
 

@@ -103,6 +103,23 @@ FORMS = (
         (0, 1),
     ),
     Form(
+        "car body line, controller in German: offset of the tool, jump on a signal",
+        program(
+            "   9:J P[1] 100% CNT0 ACC100 WKZ_Offset ,PR[2]    ;\n"
+            "  10:L P[2] 10mm/sek CNT0 ACC250 Interrupt,LABEL[1]    ;\n"
+            "  11:L P[3] 50mm/sec CNT0 ACC100 Skip,LBL[1],PR[5]=LPOS ;\n",
+            *(fanuc(i) for i in range(3)),
+        ),
+        (1, 2),
+        {6: "with WKZ_Offset"},
+    ),
+    Form(
+        "offset whose word is not known: its register shows it",
+        program("   9:J P[1] 100% CNT0 Verschub,PR[2]    ;\n  10:L P[2] 10mm/sek CNT0 ;\n", fanuc(0), fanuc(1)),
+        (1,),
+        {6: "with PR"},
+    ),
+    Form(
         "TP+ compiler: lines without numbers, positions with names, one that was never taught",
         program(
             " : J P[1:home] 10% FINE ;\n : L P[2:weld] 100mm/sec FINE ;\n : L P[3] 9mm/sec FINE ;\n",
