@@ -43,7 +43,7 @@ FORMS = (
     ),
     Form(
         "PolyScope 5 program: home by joints before a waypoint",
-        f"def weld():\n{waypoint(1, 5)}  movej({ur_joints(1)}, {FAST})\n  movej(get_inverse_kin({ur(5)}, "
+        f"def weld():\n{waypoint(1, 5)}  movej({ur_joints(0)}, {FAST})\n  movej(get_inverse_kin({ur(5)}, "
         f"qnear={ur_joints(5)}), {FAST})\n{solved(1)}end\n",
         (5, 5),
         kept=1,
