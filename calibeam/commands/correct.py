@@ -218,13 +218,8 @@ def _program(job: _Job, poses: Path, out: Path, options: Options) -> Done:
         raise DataError(f"{poses}: neither a table (.csv) nor a program (.script, .src, .dat, .mod, .prg, .ls)")
     files, outs = _with_partner(poses, out)
     texts = [_text(path, "latin-1") for path in files]  # every byte has a letter, so that all of them are kept
-    done = correct_program(
-        job.known, "".join(texts), dialect, job.frame, job.near_rad, job.every, job.solver, options, poses.name
-    )
-    ends = [len(done.text)] if len(files) == 1 else [done.placed(len(texts[0])), len(done.text)]
-    for path, begin, end in zip(outs, (0, *ends), ends, strict=False):
-        write_output(path, done.text[begin:end].encode("latin-1"), CORRECTED_PROGRAM)
-    lines = texts[0].count("\n")
+    between = "\n" if len(files) > 1 and not texts[0].endswith("\n") else ""
+    lines = (texts[0] + between).count("\n")
 
     def of_file(sentence: str) -> str:
         """Lines of the second file are counted from its own beginning."""
@@ -233,6 +228,15 @@ def _program(job: _Job, poses: Path, out: Path, options: Options) -> Done:
             sentence,
         )
 
+    try:
+        done = correct_program(
+            job.known, between.join(texts), dialect, job.frame, job.near_rad, job.every, job.solver, options, poses.name
+        )
+    except DataError as error:
+        raise DataError(of_file(str(error))) from error
+    first = done.placed(len(texts[0])) if len(files) > 1 else len(done.text)
+    for path, begin, end in zip(outs, (0, first + len(between)), (first, len(done.text)), strict=False):
+        write_output(path, done.text[begin:end].encode("latin-1"), CORRECTED_PROGRAM)
     names = [of_file(name) for name in done.names]
     notes = [of_file(sentence) for sentence in (*done.skipped, *done.warnings)]
     if done.kept:

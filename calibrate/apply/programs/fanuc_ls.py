@@ -22,11 +22,14 @@ from calibrate.apply.programs.literal import (
 
 POSITION = re.compile(r"P\[\s*(?P<number>\d+)[^\]]*\]\s*\{(?P<body>[^}]*)\}")
 FIELD = re.compile(rf"\b(?P<key>X|Y|Z|W|P|R|J[1-9])\s*=\s*(?P<number>{NUMBER})\s*(?P<unit>mm|deg)")
+EXTERNAL = re.compile(rf"\bE(?P<n>[1-9])\s*=\s*(?P<number>{NUMBER})\s*(?:mm|deg)")
 FRAMES = (("UF", re.compile(r"UF\s*:\s*(?P<n>\w+)")), ("UT", re.compile(r"UT\s*:\s*(?P<n>\w+)")))
 GROUP = re.compile(r"\bGP(?P<n>\d+)\s*:(?P<fields>(?:(?!\bGP\d)[^}])*)")
 # The end of an arc of C stands in a line of its own.
 MOVE = re.compile(r"^[ \t]*(?:\d*:\s*[JLCA]|:)\s+(?P<register>PR?)\[\s*(?P<number>\d*)", re.MULTILINE)
-MOVED = re.compile(r"\b(?:V?OFFSET|TOOL_OFFSET|INC|COORD|RTCP)\b", re.IGNORECASE)
+MOTION = re.compile(r"^[ \t]*(?P<go>\d*:[ \t]*[JLCAS][ \t]+\S)", re.MULTILINE)
+# Controllers write the words in their language (WKZ_Offset), registers of an offset in one form.
+MOVED = re.compile(r"\b(?:\w*OFFSET|INC|COORD|RTCP)\b|(?<=,)[PV]R\b(?!\s*=)", re.IGNORECASE)
 POSE = ("X", "Y", "Z", "W", "P", "R")
 
 
@@ -50,16 +53,19 @@ def find(text: str, n_joints: int) -> Targets:
         else:
             by_number.setdefault(match["number"], []).append(move)
     literals: list[Literal] = []
+    idle: list[Move] = []
     for match in POSITION.finditer(text, body):
         moves = tuple(by_number.pop(match["number"], ()))
         one = _literal(text, match, moves, n_joints)
         if isinstance(one, str):
             skipped.append((match.start(), f"P[{match['number']}]: {one}; not corrected"))
+            idle += moves
         elif moves or match["number"] not in left:
             literals.append(one)
     absent = ((move.line_start, number) for number, moves in by_number.items() for move in moves)
     skipped += [(at, f"P[{number}] is not in this file") for at, number in absent]
-    return Targets(tuple(literals), tuple(dict.fromkeys(f"line {line_of(text, at)}: {why}" for at, why in skipped)))
+    sentences = dict.fromkeys(f"line {line_of(text, at)}: {why}" for at, why in skipped)
+    return Targets(tuple(literals), tuple(sentences), moves=tuple(idle))
 
 
 def _literal(text: str, match: re.Match[str], moves: tuple[Move, ...], n_joints: int) -> Literal | str:
@@ -74,7 +80,9 @@ def _literal(text: str, match: re.Match[str], moves: tuple[Move, ...], n_joints:
     joints, fields = whole["1"]
     frame, tool = (_place(what, pattern.search(text, *parts["1"])) for what, pattern in FRAMES)
     spans, values = tuple(field.span("number") for field in fields), tuple(float(field["number"]) for field in fields)
-    return Literal(f"P[{match['number']}]", parts["1"][0], spans, values, joints, moves, own=(frame, tool))
+    axes = tuple((f"E{axis['n']}", float(axis["number"])) for axis in EXTERNAL.finditer(text, *parts["1"]))
+    name = f"P[{match['number']}]"
+    return Literal(name, parts["1"][0], spans, values, joints, moves, own=(frame, tool), external=axes)
 
 
 def _numbers(text: str, part: tuple[int, int], n_joints: int) -> tuple[bool, list[re.Match[str]]] | None:
@@ -95,4 +103,4 @@ def _place(what: str, found: re.Match[str] | None) -> NamedPose:
     return NamedPose(f"{what} {found['n']}", np.eye(4) if found["n"] == "0" else None)
 
 
-FANUC_LS = Dialect("FANUC LS", "FANUC", (".ls",), find, FANUC, True, 3, 3, None)
+FANUC_LS = Dialect("FANUC LS", "FANUC", (".ls",), find, FANUC, True, 3, 3, None, MOTION, "!")

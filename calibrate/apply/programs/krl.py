@@ -30,6 +30,7 @@ Floats = NDArray[np.float64]
 LINES = re.IGNORECASE | re.MULTILINE
 AGGREGATE = r"\{(?:\s*(?:E6POS|E6AXIS|POS|AXIS|FRAME)\s*:)?(?P<fields>[^{}\[\]]*)\}"
 FIELD = re.compile(rf"\b(?P<key>[A-Z]\w*)\s+(?P<number>{literal.NUMBER}|'B[01]+')(?=\s*(?:[,}}]|$))", re.IGNORECASE)
+EXTERNAL = re.compile(r"\b(?P<name>E[1-6])\s+(?P<value>[^\s,}][^,}]*)", re.IGNORECASE)
 NAME = r"[A-Za-z_]\w*(?:\[[^\]]*\])?"
 GOES = r"^[ \t]*(?:S?(?:PTP|LIN|CIRC)|SPL)"
 # Geometric operators make another target of a point.
@@ -42,11 +43,18 @@ INLINE_END = re.compile(rf"{ARC}{AGGREGATE}(?!\s*:)", LINES)
 ARRAY = re.compile(r"\b(?:E6POS|E6AXIS|POS|AXIS)\s+(?P<name>\w+)\s*\[", re.IGNORECASE)
 ELEMENT = re.compile(rf"^[ \t]*(?P<name>(?P<array>\w+)\s*\[\s*\d+\s*\])\s*=\s*{AGGREGATE}", LINES)
 DECLARED = re.compile(
-    rf"^[ \t]*(?:DECL\s+)?(?:GLOBAL\s+)?(?:CONST\s+)?(?:E6POS|E6AXIS|POS|AXIS)\s+(?P<name>\w+)\s*=\s*{AGGREGATE}", LINES
+    rf"^[ \t]*(?:DECL\s+)?(?:GLOBAL\s+)?(?:CONST\s+)?(?P<type>E6POS|E6AXIS|POS|AXIS|FRAME)\s+(?P<name>\w+)\s*="
+    rf"\s*{AGGREGATE}",
+    LINES,
 )
 TARGET = rf"(?P<target>\{{|{NAME}{TIMES})"
 MOVE = re.compile(rf"{GOES}\s+{TARGET}", LINES)
 ARC_END = re.compile(rf"{ARC}{TARGET}", LINES)
+MOTION = re.compile(
+    r"^[ \t]*(?P<go>(?:S?(?:PTP|LIN|CIRC)|SPL)(?:_REL)?)\b(?![ \t]*[=(])(?![ \t]+\$(?:AXIS|POS)_ACT\b)", LINES
+)
+AXIS_SET = re.compile(r"\w\.(?P<name>E[1-6])[ \t]*=(?!=)[ \t]*(?P<value>[^\n;]*)", re.IGNORECASE)
+RELATIVE = re.compile(rf"{GOES}_REL\s+{AGGREGATE}", LINES)
 OTHER = re.compile(rf"{GOES}_REL\b", LINES)
 ROUTINE = re.compile(r"^[ \t]*(?:GLOBAL\s+)?DEF(?:FCT\s+\w+)?\s+(?P<name>\w+)\s*\((?P<parameters>[^)]*)", LINES)
 WAY = re.compile(
@@ -66,7 +74,8 @@ HELD = re.compile(rf"(?<!\w)(?P<name>\$?\w+(?:[ \t]*\[[ \t]*\d+[ \t]*\])?)\s*=\s
 INLINE_DATA = re.compile(r"\bFDAT\s+(?P<name>\w+)\s*=\s*\{(?P<fields>[^{}]*)\}", re.IGNORECASE)
 CHANGED = re.compile(r"(?<![\w$.])(?P<name>\$?\w+(?:[ \t]*\[[^\]\n]*\])?)(?:\.\w+)*[ \t]*=(?!=)", re.IGNORECASE)
 CHOSEN = re.compile(r"\[(?!\d+\])")  # an index that is no number
-INLINE_FORM = re.compile(r"S(?:BASE|TOOL2?)\s*\(\s*(?P<name>\w+)\s*\)\s*", re.IGNORECASE)
+INLINE_FORM = re.compile(r"S(?:BASE|TOOL2?)\s*\(\s*(?P<name>\w+)(?:\.(?:BASE|TOOL)_NO)?\s*\)\s*", re.IGNORECASE)
+ON_AXES = re.compile(r"EK\s*\(", re.IGNORECASE)  # a base that external axes carry
 FIXED = re.compile(r"\$IPO_MODE\s*=\s*#TCP|IPO_FRAME\s+#TCP", re.IGNORECASE)
 DATA_LIST = re.compile(r"^[ \t]*DEFDAT\b.*?^[ \t]*ENDDAT\b", LINES | re.DOTALL)
 GIVEN = re.compile(rf"[(,][ \t]*(?P<name>{NAME})[ \t]*(?=[,)])", re.IGNORECASE)
@@ -90,6 +99,7 @@ def find(text: str, n_joints: int) -> literal.Targets:
     elements = (match for match in ELEMENT.finditer(code) if match["array"].lower() in arrays)
     literals: list[literal.Literal] = []
     skipped: list[str] = []
+    external: list[tuple[str, float]] = []
     for match in (*INLINE.finditer(code), *INLINE_END.finditer(code), *DECLARED.finditer(code), *elements):
         inline = match.re in (INLINE, INLINE_END)
         if inline:
@@ -98,18 +108,23 @@ def find(text: str, n_joints: int) -> literal.Targets:
         else:
             name = match["name"]
             moves = literal.moves_to(by_name, name)
+            if match.re is DECLARED and match["type"].upper() == "FRAME" and not moves:
+                continue  # a base or a tool
         fdat = "" if inline else "F" + name.upper().removeprefix("X")
         moves = tuple(_move(move, inline_data(fdat, move.line_start)) for move in moves)
         one = _literal(text, match, name, moves, n_joints, None if moves else inline_data(fdat, len(code)))
+        external += [] if one else _external(text, match)
         if one is None and not inline:
             why = f"{name}: an aggregate that does not state the whole target is not corrected"
             skipped.append(f"line {literal.line_of(text, match.start('fields'))}: {why}")
         elif one is not None:
             literals.append(one)
+    external += [axis for match in RELATIVE.finditer(code) for axis in _external(text, match)]
+    external += [_axis(match) for match in AXIS_SET.finditer(code)]
     others = ((m.end(), f"{m.group().strip()}: relative moves are not corrected") for m in OTHER.finditer(code))
     skipped += literal.sentences(code, by_name, literals, CHANGED, others)
     absent = literal.absent(code, CALLED.finditer(code), ROUTINE, BUILT_IN, "sets $BASE or $TOOL")
-    return literal.Targets(tuple(sorted(literals, key=lambda one: one.at)), tuple(skipped), absent)
+    return literal.Targets(tuple(sorted(literals, key=lambda one: one.at)), tuple(skipped), absent, tuple(external))
 
 
 def _move(move: literal.Move, own: Used | None) -> literal.Move:
@@ -135,8 +150,19 @@ def _literal(
         if all(key in fields for key in keys):
             branch, turns = (None, None) if joints or "T" not in fields else _turn(*fields["T"])
             spans, values = (tuple(part) for part in zip(*(fields[key] for key in keys), strict=True))
-            return literal.Literal(name, begin, spans, values, joints, moves, branch, turns, own)
+            axes = tuple(_external(text, match))
+            return literal.Literal(name, begin, spans, values, joints, moves, branch, turns, own, (), axes)
     return None
+
+
+def _external(text: str, match: re.Match[str]) -> list[tuple[str, float]]:
+    """External axes of an aggregate; NaN for one that is an expression."""
+    return [_axis(axis) for axis in EXTERNAL.finditer(text, *match.span("fields"))]
+
+
+def _axis(match: re.Match[str]) -> tuple[str, float]:
+    value = match["value"].strip()
+    return match["name"].upper(), float(value) if re.fullmatch(literal.NUMBER, value) else np.nan
 
 
 def _fields(text: str, begin: int, end: int) -> dict[str, tuple[literal.Span, float]]:
@@ -190,7 +216,11 @@ def _places(code: str) -> tuple[literal.Places, Callable[[str, int], Used | None
         what = (match["what"] or match["kind"] or "").upper()
         pose = place(what, value or f"{what}_DATA[{match['number']}]", match.start())
         line = literal.line_of(code, match.start())
-        if match["part"]:
+        if ON_AXES.match(value):
+            pose = replace(
+                nothing, name=f"EK of line {line}", refused=f"its base is carried by external axes (EK, line {line})"
+            )
+        elif match["part"]:
             pose = replace(nothing, refused=f"line {line} sets only a component of ${what}, which is not followed")
         elif pose.name == f"${what}":  # written out
             pose = replace(pose, name=f"base as set in line {line}" if what == "BASE" else f"$TOOL of line {line}")
@@ -263,4 +293,4 @@ def overshoot(move: literal.Move, joints: Sequence[str]) -> str:
     return f"{indent}PTP {{{', '.join(f'A{j + 1} {angle}' for j, angle in enumerate(joints))}}}"
 
 
-KRL = literal.Dialect("KRL", "KUKA", (".src", ".dat", ".sub"), find, KUKA, True, 4, 5, overshoot)
+KRL = literal.Dialect("KRL", "KUKA", (".src", ".dat", ".sub"), find, KUKA, True, 4, 5, overshoot, MOTION, ";")

@@ -18,6 +18,7 @@ from calibrate.errors import DataError
 Floats = NDArray[np.float64]
 Span = tuple[int, int]
 Notes = tuple[str, ...]
+Axes = tuple[tuple[str, float], ...]  # external axes: name, and mm or degrees as written; NaN: computed
 T = TypeVar("T")
 
 UNIT = 1e-2  # by which the length of a quaternion may differ from 1: rounding of two decimals
@@ -68,6 +69,8 @@ class Literal:
     branch: Branch | None = None
     turns: Turns | None = None
     own: tuple[NamedPose, NamedPose] | None = None  # frame and tool that it names itself; None: those of its moves
+    near: tuple[float, ...] = ()  # joint by joint, as written: the posture that it asks for; empty: it asks for none
+    external: Axes = ()
 
     @property
     def used(self) -> tuple[tuple[NamedPose, ...], tuple[NamedPose, ...]]:
@@ -84,6 +87,8 @@ class Targets:
     literals: tuple[Literal, ...]
     skipped: tuple[str, ...]
     absent: tuple[str, ...] = ()  # sentences about routines that are called and are not in the file
+    external: Axes = ()  # of aggregates that are no literal
+    moves: tuple[Move, ...] = ()  # to targets that are `skipped`
 
 
 @dataclass(frozen=True)
@@ -99,6 +104,8 @@ class Dialect:
     length_digits: int
     angle_digits: int
     overshoot: Callable[[Move, Sequence[str]], str] | None  # the line of a move to joint angles; None: not possible
+    motion: re.Pattern[str]  # the beginning of every instruction that moves the arm, whether its target is read or not
+    comment: str  # what begins one
 
     def pose_numbers(self, position_m: Floats, R: Floats) -> list[str]:
         turn = self.rotation.from_matrix(R[None])[0]
@@ -170,6 +177,17 @@ def absent(code: str, calls: Iterable[re.Match[str]], held: re.Pattern[str], own
             says = f"line {line}: {name} is not in this file: if it {sets}, the targets after it are wrong"
             first.setdefault(name.lower(), says)
     return tuple(first.values())
+
+
+def arguments(call: str) -> list[str]:
+    """Between the commas that stand in no brackets."""
+    parts, depth = [""], 0
+    for letter in call:
+        depth += (letter in "[(") - (letter in "])")
+        parts[-1] += letter
+        if letter == "," and depth == 0:
+            parts[-1:] = [parts[-1][:-1], ""]
+    return parts
 
 
 def line_start(text: str, at: int) -> int:

@@ -9,14 +9,11 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-from calibrate.apply.correct.corrected import Branch
 from calibrate.apply.correct.rotations import QUATERNION
 from calibrate.apply.programs import literal
+from calibrate.apply.programs.rapid_configurations import as_observed, observed_along, quarters
 from calibrate.apply.programs.stated_frames import words_of
-
-Floats = NDArray[np.float64]
 
 
 def _list(count: int) -> str:
@@ -80,9 +77,11 @@ BUILT_IN = literal.built_in(rf"""
     Write(?:Bin|StrBin)? TextTabInstall WZ\w+ TP(?:Erase|Write|Show|Read\w+) UI(?:Show|Msg\w+) Open(?:Dir)?
     Close(?:Dir)? Rewind ClearIOBuff (?:Make|Remove)Dir (?:Copy|Remove|Rename)File Socket\w+ RMQ\w+ Spy(?:Start|Stop)
     TestSign\w+ WarmStart EGM\w+ Cam[A-Z]\w+""")
+MOTION = re.compile(rf"\b(?P<go>(?:Move[A-Z]|{PROCESS}|Search[JLC])\w*[ \t]*[\s\\\[])", re.IGNORECASE)
+EXTERNAL = tuple(f"eax_{letter}" for letter in "abcdef")
+AXES_SET = re.compile(r"\.extax\s*(?:\.\s*(?P<axis>eax_[a-f])\s*)?:=\s*(?P<value>[^;]*)", re.IGNORECASE)
+UNUSED = 8.9e9  # and above: 9E9 for an axis that is not there
 LONGEST = 400  # letters between the beginning of a move and its last target
-QUARTER = np.pi / 2.0
-CF = ((0, 0), (1, 3), (2, 5))  # entry of confdata, joint from 0
 
 
 def find(text: str, n_joints: int) -> literal.Targets:
@@ -100,14 +99,25 @@ def find(text: str, n_joints: int) -> literal.Targets:
         elif inline:
             moves = (literal.instruction(text, first + inline.start(), places, ";"),)
             literals.append(_literal(text, match, f"line {literal.line_of(text, match.start())}", moves))
+    observed = observed_along(code, _calls(code))
+    literals = [as_observed(one, observed) for one in literals]
     skipped = literal.sentences(code, by_name, literals, ASSIGNED, literal.unread(text, code, TARGET, literals))
-    if SHIFTED.search(code):
-        why = "the program displaces its targets (PDispSet, PDispOn), which is not corrected"
-        return literal.Targets((), (why, *skipped))
     if n_joints != 6:
         return literal.Targets((), (*skipped, f"RAPID targets have six axes, this arm has {n_joints}"))
+    external = tuple(axis for match in AXES_SET.finditer(code) for axis in _axes_set(match))
     what = "displaces the program, or changes a work object or a tool"
-    return literal.Targets(tuple(literals), skipped, literal.absent(code, _calls(code), ROUTINE, BUILT_IN, what))
+    return literal.Targets(
+        tuple(literals), skipped, literal.absent(code, _calls(code), ROUTINE, BUILT_IN, what), external
+    )
+
+
+def _axes_set(match: re.Match[str]) -> literal.Axes:
+    """External axes that an assignment changes; NaN for one that is computed."""
+    names = (match["axis"].lower(),) if match["axis"] else EXTERNAL
+    values = [v.strip() for v in match["value"].strip().removeprefix("[").removesuffix("]").split(",")]
+    if len(values) != len(names) or not all(re.fullmatch(literal.NUMBER, v) for v in values):
+        return tuple((name, np.nan) for name in names)
+    return tuple((name, float(v)) for name, v in zip(names, values, strict=True) if abs(float(v)) < UNUSED)
 
 
 def _calls(code: str) -> Iterator[re.Match[str]]:
@@ -130,25 +140,12 @@ def _literal(text: str, match: re.Match[str], name: str, moves: tuple[literal.Mo
     group = "pose" if match["pose"] else "joints"
     found: list[tuple[literal.Span, float]] = list(literal.numbers_in(text, *match.span(group)))
     taken = found[:7] if group == "pose" else found[:6]
+    axes = tuple((name, v) for name, (_, v) in zip(EXTERNAL, found[-6:], strict=True) if abs(v) < UNUSED)
     spans, numbers = tuple(s for s, _ in taken), tuple(v for _, v in taken)
-    branch, turns = _quarters(found[7:11]) if group == "pose" else (None, None)
-    return literal.Literal(name, match.start(group), spans, numbers, group == "joints", moves, branch, turns)
-
-
-def _quarters(confdata: Sequence[tuple[literal.Span, float]]) -> tuple[Branch, literal.Turns]:
-    """An angle on the edge of two quarters may be written as either."""
-
-    def within(q_rad: Floats, k: int) -> NDArray[np.bool_]:
-        begin_rad = QUARTER * confdata[k][1]
-        return (q_rad >= begin_rad - literal.EDGE_RAD) & (q_rad <= begin_rad + QUARTER + literal.EDGE_RAD)
-
-    def asked(q_rad: Floats) -> NDArray[np.bool_]:
-        return np.asarray(np.all([within(q_rad[:, j], k) for k, j in CF], axis=0), dtype=np.bool_)
-
-    def turns(q_rad: Floats) -> list[tuple[literal.Span, str]]:
-        return [(confdata[k][0], f"{np.floor(q_rad[j] / QUARTER):.0f}") for k, j in CF if not within(q_rad[j], k)]
-
-    return asked, turns
+    branch, turns = quarters(found[7:11]) if group == "pose" else (None, None)
+    return literal.Literal(
+        name, match.start(group), spans, numbers, group == "joints", moves, branch, turns, None, (), axes
+    )
 
 
 def _places(code: str) -> literal.Places:
@@ -171,27 +168,21 @@ def _places(code: str) -> literal.Places:
     for match in PARAMETER.finditer(code):
         held[match["name"].lower()] = literal.NamedPose(refused=f"{match['name']} is a parameter of its routine")
 
+    shifted = literal.NamedPose(refused="the program displaces its targets (PDispSet, PDispOn)")
+    shifts = SHIFTED.search(code) is not None
+
     def places(at: int) -> tuple[literal.NamedPose, literal.NamedPose]:
         end = code.find(";", at, at + literal.LONGEST_MOVE)
-        parts = _arguments(code[at : at + literal.LONGEST_MOVE if end < 0 else end])
+        # An optional argument may stand behind a comma of its own.
+        parts = literal.arguments(re.sub(r",\s*(?=\\)", " ", code[at : at + literal.LONGEST_MOVE if end < 0 else end]))
         k = 3 + sum(group is not None for group in plain.groups()) if (plain := PLAIN.match(parts[0])) else -1
         last = next((part for part in parts if USED.search(part)), parts[k] if k < len(parts) else "")
         used, tool = USED.search(last), last.split("\\")[0].strip()
         name = used["name"] if used else "wobj0"
-        return held.get(name.lower(), literal.NamedPose(name)), held.get(tool.lower(), literal.NamedPose(tool))
+        frame = shifted if shifts else held.get(name.lower(), literal.NamedPose(name))
+        return frame, held.get(tool.lower(), literal.NamedPose(tool))
 
     return places
-
-
-def _arguments(move: str) -> list[str]:
-    """Between the commas that stand in no brackets."""
-    parts, depth = [""], 0
-    for letter in move:
-        depth += (letter in "[(") - (letter in "])")
-        parts[-1] += letter
-        if letter == "," and depth == 0:
-            parts[-1:] = [parts[-1][:-1], ""]
-    return parts
 
 
 def overshoot(move: literal.Move, joints: Sequence[str]) -> str:
@@ -205,4 +196,4 @@ def overshoot(move: literal.Move, joints: Sequence[str]) -> str:
     return f"{indent}MoveAbsJ [[{', '.join(joints)}], [9E9, 9E9, 9E9, 9E9, 9E9, 9E9]]{rest}"
 
 
-RAPID = literal.Dialect("RAPID", "ABB", (".mod", ".prg", ".modx"), find, QUATERNION, True, 4, 8, overshoot)
+RAPID = literal.Dialect("RAPID", "ABB", (".mod", ".prg", ".modx"), find, QUATERNION, True, 4, 8, overshoot, MOTION, "!")

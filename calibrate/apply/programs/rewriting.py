@@ -26,6 +26,7 @@ from calibrate.apply.correct.corrected import (
     predicted_errors,
     wanted_joints,
 )
+from calibrate.apply.programs.examined import LINE, examined, nothing_but_joints, nothing_corrected
 from calibrate.apply.programs.fanuc_ls import FANUC_LS
 from calibrate.apply.programs.krl import KRL
 from calibrate.apply.programs.literal import (
@@ -46,7 +47,6 @@ from calibrate.model.rigid import inverse
 
 Floats = NDArray[np.float64]
 
-LINE = re.compile(r"line (\d+)\b")
 # Moves along a line or an arc, of all dialects.
 ALONG = re.compile(
     r"\b(?:(?:Move|Arc|Cap|Cut|Disp|Paint|Trigg)[LC]|S?LIN\b|S?CIRC\b|move[lpc]\b)|^\s*\d*:\s*[LCA]\s", re.IGNORECASE
@@ -106,12 +106,12 @@ def correct_program(
     DataError where there is no target that could be corrected, or one `frame` or tool stands for several.
     """
     arms = Arms.of(model, options)
-    targets = dialect.find(text, arms.n_joints)
+    targets = examined(dialect.find(text, arms.n_joints), text, dialect, options.joint_targets)
     every_target = targets.literals
     kept = tuple(one.name for one in targets.literals if one.joints and not options.joint_targets)
     some = tuple(one for one in targets.literals if options.joint_targets or not one.joints)
     if kept and not some:
-        raise DataError(f"{name}: all {len(kept)} targets are joint targets, which stay as they are; --joint-targets")
+        raise DataError(f"{name}: {nothing_but_joints(targets, len(kept))}")
     targets, base, tool = stated(replace(targets, literals=some), text, frame, options.tool, arms.stated_tool, name)
     names, options = _named(targets.literals, replace(options, tool=tool))
     arms = Arms.of(model, options)
@@ -120,7 +120,7 @@ def correct_program(
         raise DataError(f"{name}: a frame or tool has a number beyond {LENGTH_M / 1e3:g} km; correct it")
     wanted = _wanted(targets.literals, dialect, arms, base, near_rad, every)
     for row, joints_rad in _behind_joints(every_target, targets.literals, dialect):
-        wanted.near_rad[row] = joints_rad
+        wanted.near_rad[row] = wanted.near_rad[row] if targets.literals[row].near else joints_rad
     found = correct(model, replace(wanted, source=name), inverse_of, options)
     pieces, q_rad = list[tuple[int, int, str]](), found.q_rad.copy()
     in_base = inverse(base) @ found.T_base_tool
@@ -188,8 +188,7 @@ def _seams(text: str, targets: Targets, done: Sequence[bool]) -> tuple[str, ...]
 
 def _check(targets: Targets, dialect: Dialect, options: Options, text: str, name: str) -> None:
     if not targets.literals:
-        why = f"; {targets.skipped[0]}" if targets.skipped else ""
-        raise DataError(f"{name}: no target of {dialect.name} that could be corrected{why}")
+        raise DataError(f"{name}: {nothing_corrected(targets, text, dialect)}")
     if far := next((one for one in targets.literals if not _in_bounds(one, dialect)), None):
         raise DataError(
             f"{name}: {shown(far.name, 40)} has a number beyond {LENGTH_M / 1e3:g} km or {ANGLE_RAD:g} rad; correct it"
@@ -248,6 +247,8 @@ def _wanted(
             T[row] = wanted_joints(arms, joints[[row]])[0]
         else:
             T[row] = base[row] @ dialect.frame(one.numbers)
+            if len(one.near) == arms.n_joints:
+                near[row] = dialect.joints_rad(one.near)
     branches = tuple(one.branch for one in literals)
     return Wanted(T, joints, near, {c: np.full(n, v) for c, v in every.items()}, False, branches)
 

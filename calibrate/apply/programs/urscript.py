@@ -5,7 +5,10 @@ movej and movel take either form; a comment begins with #.
 """
 
 import re
-from collections.abc import Iterator, Sequence
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from functools import cache
 
 import numpy as np
 
@@ -14,6 +17,7 @@ from calibrate.apply.programs import literal
 from calibrate.apply.programs.stated_frames import (
     CALL,
     Event,
+    Used,
     closed,
     routines_of,
     set_above,
@@ -23,7 +27,11 @@ from calibrate.apply.programs.stated_frames import (
 LIST = rf"(?P<pose>p?)\[\s*{literal.NUMBER}(?:\s*,\s*{literal.NUMBER})*\s*\]"
 NAME = r"[A-Za-z_]\w*(?:\[[^\[\]]*\])?"
 CALLED = r"(?:\((?:[^()\n]|\([^()\n]*\))*\))?"
-GOES = r"\b(?:movej|movel|movep|servoj|servoc|movec)\s*\(\s*(?:\w+\s*=\s*)?"
+SOLVED = r"(?:get_inverse_kin\s*\(\s*(?:x\s*=\s*)?)?"  # a pose that the script itself turns into joint angles
+FEATURE = r"pose_trans\s*\(\s*(?P<feature>[A-Za-z_]\w*)\s*,\s*"  # a pose within a named one
+FIRST = r"\s*\(\s*(?:\w+\s*=\s*)?"
+# An arc has two targets, of which each may be in a pose of its own: only plain ones are read.
+GOES = rf"\b(?:movec{FIRST}|(?:movej|movel|movep|servoj|servoc){FIRST}(?:{SOLVED}{FEATURE}|{SOLVED}))"
 MOVE = re.compile(rf"{GOES}(?P<target>p?\[|{NAME})")
 INLINE = re.compile(rf"{GOES}{LIST}")
 # An arc has two targets: a point on it, and its end.
@@ -53,7 +61,12 @@ BUILT_IN = literal.built_in(r"""
     set_(?:tcp|gravity|pos|flag|(?:target_)?payload\w*|conveyor_tick_count|input_actions_to_default)
     set_(?:tool_)?(?:voltage|output_mode|communication|(?:digital|analog)_\w+)
     set_(?:analog\w+|safety_mode_transition_hardness|base_acceleration)""")
-TCP = re.compile(rf"\bset_tcp\s*\(\s*(?:(?P<literal>{LIST}\s*\))|(?P<words>[^\n]*))")
+MOTION = re.compile(r"\b(?P<go>(?:opti)?move[jlpc]|servo[jc])[ \t]*\(")
+GOING = re.compile(GOES)
+SOLUTION = re.compile(r"\bget_inverse_kin\s*\(")
+ARGUMENTS = ("x", "qnear", "maxPositionError", "maxOrientationError", "tcp")  # of get_inverse_kin, in their order
+OWN_TOOL = re.compile(r"\btcp\s*=\s*p\[[^\]]*\]")  # of get_inverse_kin
+TCP = re.compile(rf"\bset_tcp\s*\(\s*(?:(?P<literal>{LIST}\s*[,)])|(?P<words>[^\n]*))")
 
 
 def find(text: str, n_joints: int) -> literal.Targets:
@@ -69,13 +82,21 @@ def find(text: str, n_joints: int) -> literal.Targets:
     for name, match in named:
         if moves := literal.moves_to(by_name, name):
             literals.append(_literal(text, match, name, moves))
+    asked = _asked_postures(code)
+    literals = [replace(one, near=asked(one.moves)) for one in literals]
     good = [one for one in literals if len(one.numbers) == (n_joints if one.joints else 6)]
-    tools = [match.span() for match in TCP.finditer(code)]
     unread = literal.unread(text, code, POSE, good)
-    left = (one for one in unread if not any(begin <= one[0] < end for begin, end in tools))
+    left = (one for one in unread if not any(begin <= one[0] < end for begin, end in _no_targets(code)))
     skipped = literal.sentences(code, by_name, good, CHANGED, left)
     absent = literal.absent(code, CALL.finditer(code), ROUTINE, BUILT_IN, "sets the tool (set_tcp)")
     return literal.Targets(tuple(sorted(good, key=lambda one: one.at)), skipped, absent)
+
+
+def _no_targets(code: str) -> list[literal.Span]:
+    """Where tools stand, and poses within which the script has its targets."""
+    features = {match["feature"] for match in MOVE.finditer(code)}
+    assigned = [match.span() for match in ASSIGNED.finditer(code) if match["name"] in features]
+    return [match.span() for tools in (TCP, OWN_TOOL) for match in tools.finditer(code)] + assigned
 
 
 def _places(code: str) -> literal.Places:
@@ -88,8 +109,75 @@ def _places(code: str) -> literal.Places:
         line = f"set_tcp of line {literal.line_of(code, match.start())}"
         tool = literal.NamedPose(line, URSCRIPT.frame(numbers) if len(numbers) == 6 else None)
         events.append(Event(closed(code, match.start()), "set", "", tool, words_of(match["words"] or "")))
-    above = set_above(events, literal.NamedPose(), "tool")
-    return lambda at: (base, above(at))
+    above, within = set_above(events, literal.NamedPose(), "tool"), _features(code)
+
+    def places(at: int) -> Used:
+        tool, going = above(at), GOING.match(code, at)
+        if (solution := _solution(code[at : at + literal.LONGEST_MOVE].split("\n")[0])) and "tcp" in solution:
+            tool = literal.NamedPose(refused="get_inverse_kin has a tool of its own (tcp)")
+        return within(going["feature"], at) if going and going["feature"] else base, tool
+
+    return places
+
+
+def _features(code: str) -> Callable[[str, int], literal.NamedPose]:
+    """Of the first pose of pose_trans at a place: as the script has assigned it on its way there."""
+    ways, targets = routines_of(code, ROUTINE, WAY), set[str]()
+    for match in (*MOVE.finditer(code), *ARC_END.finditer(code)):
+        if match.re is ARC_END or match["feature"] is None:
+            targets.add(literal.key(match["target"]))
+    written = {match.start("name"): match for match in ASSIGNED.finditer(code)}
+
+    @cache
+    def above(name: str) -> Callable[[int], literal.NamedPose]:
+        events = list(ways)
+        for match in CHANGED.finditer(code):
+            if match["name"].split("[")[0] == name:
+                pose = written.get(match.start("name"))
+                numbers = [v for _, v in literal.numbers_in(code, pose.start("pose"), pose.end())] if pose else []
+                line = literal.line_of(code, match.start("name"))
+                why = "" if len(numbers) == 6 else f"{name} of pose_trans is computed in line {line}"
+                T = None if why else URSCRIPT.frame(numbers)
+                events.append(Event(match.end(), "set", "", literal.NamedPose(name, T, why)))
+        return set_above(events, literal.NamedPose(name), f"pose {name} of pose_trans")
+
+    def within(name: str, at: int) -> literal.NamedPose:
+        if literal.key(name) in targets:
+            return literal.NamedPose(refused=f"{name} of pose_trans is a target of another move")
+        return above(name)(at)
+
+    return within
+
+
+def _solution(instruction: str) -> dict[str, str]:
+    """Arguments of get_inverse_kin by name; empty where an instruction has none."""
+    if (match := SOLUTION.search(instruction)) is None:
+        return {}
+    given = instruction[match.end() : closed(instruction, match.end() - 1)]
+    found: dict[str, str] = {}
+    for name, argument in zip(ARGUMENTS, literal.arguments(given), strict=False):
+        named = re.fullmatch(r"\s*(\w+)\s*=(?!=)(.*)", argument, re.DOTALL)
+        found[named[1] if named else name] = (named[2] if named else argument).strip()
+    return found
+
+
+def _asked_postures(code: str) -> Callable[[Sequence[literal.Move]], tuple[float, ...]]:
+    """Of the moves to a target, the joint angles near which get_inverse_kin looks; empty where they do not agree."""
+    times = Counter(match["name"].split("[")[0] for match in CHANGED.finditer(code))
+    lists = {m["name"]: _numbers(m) for m in ASSIGNED.finditer(code) if not m["pose"] and times[m["name"]] == 1}
+
+    def asked(moves: Sequence[literal.Move]) -> tuple[float, ...]:
+        found = set[tuple[float, ...]]()
+        for near in (_solution(move.text).get("qnear", "") for move in moves):
+            written = re.fullmatch(LIST, near)
+            found.add(_numbers(written) if written and not written["pose"] else lists.get(near, ()))
+        return found.pop() if len(found) == 1 else ()
+
+    return asked
+
+
+def _numbers(match: re.Match[str]) -> tuple[float, ...]:
+    return tuple(v for _, v in literal.numbers_in(match.string, match.start("pose"), match.end()))
 
 
 def _elements(code: str, array: re.Match[str]) -> Iterator[tuple[int, re.Match[str]]]:
@@ -113,4 +201,6 @@ def overshoot(move: literal.Move, joints: Sequence[str]) -> str:
     return f"{indent}movej([{', '.join(joints)}], v=0.25)"
 
 
-URSCRIPT = literal.Dialect("URScript", "UR", (".script", ".urscript"), find, VECTOR, False, 7, 7, overshoot)
+URSCRIPT = literal.Dialect(
+    "URScript", "UR", (".script", ".urscript"), find, VECTOR, False, 7, 7, overshoot, MOTION, "#"
+)

@@ -30,7 +30,7 @@ DEF weld()\r
   $TOOL = {{X 0.000, Y 0.000, Z 0.000, A 0.000, B 0.000, C 0.000}}\r
   $BASE = $NULLFRAME\r
   PTP {{{q}}} C_PTP\r
-  LIN {{E6POS: {0}, S 2, T {t0}, E1 12.500}} C_DIS ; X 99.999\r
+  LIN {{E6POS: {0}, S 2, T {t0}, E1 0.000}} C_DIS ; X 99.999\r
   PTP_REL {{X 10.000}}\r
   SLIN {{{1}, S 2, T {t1}}}\r
 END\r
