@@ -4,8 +4,9 @@ cantools reads the file and takes frames apart; what it raises becomes DeviceRef
 """
 
 import enum
+import logging
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -15,11 +16,13 @@ from cantools.database.can import Database, Message, Signal
 from drivers.cia406.codec import Scale
 from drivers.errors import DeviceRefused
 
+log = logging.getLogger(__name__)
 SHOWN = 120  # characters of what a file holds, in an error
 FLOAT_STEPS = 1 << 40  # counts in 1.0 of a floating-point signal: finer than what 32 bits resolve of one turn
 MANTISSA_BITS = {16: 10, 32: 23, 64: 52}  # IEEE 754
 MOST_RAD = 1e5  # 16,000 turns: an encoder on the motor, over the whole travel of an axis with a gear
 ROUNDED = 1e-6  # of the span of a stated range, whose ends are written with some digits
+CHANCE = 0.01  # of a turn
 UNITS_RAD = {
     "rad": 1.0,
     "mrad": 1e-3,
@@ -94,15 +97,29 @@ class JointSignal:
 
 
 def joint_signals(path: Path, names: Sequence[str], units_per_turn: float | None) -> tuple[JointSignal, ...]:
-    """Signals "Message.Signal" of a DBC file, in order. DeviceRefused naming what is there instead."""
+    """Signals "Message.Signal" of a DBC file, in order. DeviceRefused naming what is there instead.
+
+    A file with signals that overlap, or do not fit in their message, is read all the same; each such message is logged.
+    """
     try:
-        database = cantools.database.load_file(path)
+        database = cantools.database.load_file(path, strict=False)
     except (OSError, ValueError, cantools.Error) as cause:
         why = str(cause)[:SHOWN]  # a parser's words repeat the whole line
         raise DeviceRefused(f"encoders: {path} cannot be read as a DBC file ({why}); export it again") from cause
     if not isinstance(database, Database):
         raise DeviceRefused(f"encoders: {path} describes no CAN bus, but diagnostics; name a DBC file")
+    for fault in _layout_faults(database):
+        log.warning("%s: %s It was read as it stands; correct the DBC file", path, fault)
     return tuple(_joint_signal(database, path, name, units_per_turn) for name in names)
+
+
+def _layout_faults(database: Database) -> Iterator[str]:
+    """What cantools' strict check finds wrong, of each message, which it names."""
+    for message in database.messages:
+        try:
+            message.refresh(strict=True)
+        except cantools.Error as fault:
+            yield str(fault)[:SHOWN]
 
 
 def _joint_signal(database: Database, path: Path, name: str, units_per_turn: float | None) -> JointSignal:
@@ -153,7 +170,7 @@ def _range(signal: Signal, units_per_turn: float) -> tuple[float, bool]:
     counts = (ends[1] - ends[0]) / abs(float(signal.scale))
     for steps in (counts * FLOAT_STEPS,) if signal.is_float else (counts, counts + 1.0):
         turns = round(steps / units_per_turn)
-        slack = ROUNDED * steps if signal.is_float else 0.5
+        slack = ROUNDED * steps if signal.is_float else _slack(units_per_turn)
         if turns > 0 and abs(steps - turns * units_per_turn) < slack:
             return _whole(turns * units_per_turn), True
     return math.inf, False
@@ -162,7 +179,12 @@ def _range(signal: Signal, units_per_turn: float) -> tuple[float, bool]:
 def _counter_range(signal: Signal, units_per_turn: float) -> tuple[float, bool]:
     bits = 1 << signal.length
     turns = round(bits / units_per_turn)
-    return bits, turns > 0 and abs(bits - turns * units_per_turn) < 0.5
+    return bits, turns > 0 and abs(bits - turns * units_per_turn) < _slack(units_per_turn)
+
+
+def _slack(units_per_turn: float) -> float:
+    """Counts by which whole turns may be missed: the ends are counts, and few counts a turn would hit by chance."""
+    return min(0.5, CHANCE * units_per_turn)
 
 
 def _whole(units: float) -> float:
