@@ -18,14 +18,16 @@ import numpy as np
 
 from acquisition.recording import Channel, Recording, RecordingError, Stream
 from acquisition.recording.can_frames import Frame, FrameFlag, frames_of, is_frames
+from acquisition.recording.check_recording import NO_READING
 from acquisition.recording.foreign import Sheet
 from acquisition.recording.rig.devices import EncoderDriver, EncodersDevice
-from drivers.can_dbc.description import joint_signals
+from drivers.can_dbc.description import JointSignal, joint_signals
+from drivers.can_dbc.layouts import jumps_of
 from drivers.can_dbc.rows import EncoderRow, EncoderSignal, RowsOfFrames
 from drivers.cia406 import codec
 from drivers.cia406.codec import SPEED_LIMIT_RAD_S, Scale
 
-STREAM, CHANNEL, NO_READING = "encoders", "position_rad", "no_reading"
+STREAM, CHANNEL = "encoders", "position_rad"
 
 SDO_ANSWER, SDO_REQUEST, PDO2 = 0x580, 0x600, 0x280  # and the node: the predefined connection set of CiA 301
 SET_UP = (codec.OPERATING_PARAMETERS, codec.UNITS_PER_TURN, codec.RANGE_UNITS, codec.TURN_RESOLUTION, codec.TURNS)
@@ -38,6 +40,14 @@ class Row:
     host_s: float
     angles_rad: tuple[float, ...]
     no_reading: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class EncoderLog:
+    """The rows of all encoders; `warnings`: signals that jump as the DBC file places them, and where they would not."""
+
+    rows: list[Row]
+    warnings: tuple[str, ...] = ()
 
 
 class NoSetUpError(RecordingError):
@@ -58,7 +68,7 @@ class NodePosition:
         return self.number.read(data)
 
 
-def encoder_rows(recording: Recording, encoders: EncodersDevice) -> list[Row]:
+def encoder_rows(recording: Recording, encoders: EncodersDevice) -> EncoderLog:
     """Host time and angle of every joint, NaN with the reason where there is none.
 
     RecordingError where no frame is of these encoders, or several buses have them; NoSetUpError; DeviceRefused for a
@@ -80,13 +90,30 @@ def encoder_rows(recording: Recording, encoders: EncodersDevice) -> list[Row]:
     frames = [frame for bus in buses for frame in bus] if not theirs else theirs[0]
     limit = encoders.acceleration_limit_rad_s2
     sync = None if plain else codec.SYNC_ID
-    rows = list(_rows(sorted(frames, key=lambda f: f.host_s), joints, math.inf if limit is None else limit, sync))
+    frames.sort(key=lambda f: f.host_s)
+    rows = list(_rows(frames, joints, math.inf if limit is None else limit, sync))
     if not rows:
         raise RecordingError(
             f"{recording.path}: none of {len(frames)} frames is of {joints[0].name} … {joints[-1].name} of "
             f"{encoders.dbc if plain else 'CiA 406'}; check [devices.encoders] of the rig file"
         )
-    return rows
+    return EncoderLog(rows, tuple(_jumps(frames, joints)))
+
+
+def _jumps(frames: Sequence[Frame], joints: Sequence[EncoderSignal]) -> Iterator[str]:
+    for joint in joints:
+        if not isinstance(joint, JointSignal):  # CiA 406: the mapping of the encoder states the place
+            continue
+        own = [
+            frame
+            for frame in frames
+            if (frame.can_id, bool(frame.flags & FrameFlag.EXTENDED)) == joint.frame
+            and not frame.flags & (FrameFlag.REMOTE | FrameFlag.ERROR)
+            and joint.counts(frame.data) is not None
+        ]
+        jumps = jumps_of(joint, [frame.host_s for frame in own], [frame.data for frame in own])
+        if jumps is not None:
+            yield str(jumps)
 
 
 def encoder_stream(rows: list[Row], frames: Recording) -> Stream:

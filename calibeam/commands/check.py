@@ -11,6 +11,7 @@ import numpy as np
 from cyclopts import Parameter
 
 from acquisition.recording import Finding, Recording, Stream, check, read
+from acquisition.recording.check_recording import NO_ANSWER, NO_READING, Problem
 from acquisition.recording.device_clock import ClockModel, ClockStatus, clock_model
 from acquisition.recording.mcap import segments
 from acquisition.recording.rig import load_rig, parse_rig
@@ -84,6 +85,8 @@ def lines(recording: Recording, findings: tuple[Finding, ...]) -> list[str]:
     errors = any(finding.is_error for finding in findings)
     if errors:
         return [*reported, "  not fit for use: errors above"]
+    if any(finding.problem is Problem.READINGS for finding in findings):
+        return [*reported, "  readings were left out; see the warnings above"]
     warned = any(f.severity.value == "warning" for f in findings)
     return [*reported, "  no errors; see the warnings above" if warned else "  no errors"]
 
@@ -99,8 +102,7 @@ def encoder_lines(recording: Recording) -> Iterator[str]:
             f"period {_ms(pace.period_s)}, jitter {1e6 * pace.jitter_s:.0f} µs (1 sigma), "
             f"longest time between two rows {_ms(pace.longest_s)}"
         )
-    mute = np.isnan(device.track.values).sum(axis=0)
-    yield from (f"encoder {k + 1}: no answer in {n} rows" for k, n in enumerate(mute) if n)
+    yield from _unanswered(recording, device.track.values)
     for pair in pairs:
         against = f"encoder {pair.number} against encoder 1"
         noise = "" if pair.noise_rad is None else f"noise of a reading {angle(pair.noise_rad, 2)}; "
@@ -115,6 +117,14 @@ def encoder_lines(recording: Recording) -> Iterator[str]:
             at_s = slip.from_s - recording.host_s0, slip.to_s - recording.host_s0
             size = angle_with_sigma(slip.size_rad, slip.sigma_rad)
             yield f"{against}: slip of {size} between {at_s[0]:.2f} and {at_s[1]:.2f} s"
+
+
+def _unanswered(recording: Recording, angles_rad: Floats) -> Iterator[str]:
+    """Rows without an angle; where the recording holds no reasons, both are named. Those left out are findings."""
+    codes = next((s.values[NO_READING] for s in recording.streams.values() if NO_READING in s.values), None)
+    missing = np.isnan(angles_rad) if codes is None else codes == NO_ANSWER
+    why = "no answer" if codes is not None else "no angle (no answer, or a step faster than a joint turns)"
+    yield from (f"encoder {k + 1}: {why} in {n} rows" for k, n in enumerate(missing.sum(axis=0)) if n)
 
 
 def _rate(stream: Stream) -> str:
