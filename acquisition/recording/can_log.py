@@ -41,7 +41,7 @@ from acquisition.recording.can_frames import (
     stream_names,
 )
 from acquisition.recording.errors import RecordingError, shown
-from acquisition.recording.files.bounds import BATCH_BYTES, FEW, MESSAGES, TABLE_BYTES, TIME_S, UNPACKED_BYTES
+from acquisition.recording.files.bounds import BATCH_BYTES, FEW, MESSAGES, SPAN_S, TABLE_BYTES, TIME_S, UNPACKED_BYTES
 from acquisition.recording.mcap.writer import RecordingWriter, StreamWriter
 from acquisition.recording.recording import Recording, Stamps, time_utc
 
@@ -253,7 +253,7 @@ class _Log:
         self._mode = "rb" if path.suffix.lower() == ".blf" else "r"
 
     def __iter__(self) -> Iterator[can.Message]:
-        count = 0
+        count, first_s = 0, math.nan
         try:
             most = max(MESSAGES, self._path.stat().st_size // 12)
             if self._mode == "rb":
@@ -261,7 +261,8 @@ class _Log:
             # opened here: python-can leaves a file open whose beginning it does not know
             with self._path.open(self._mode) as file, self._open(file) as messages:
                 for message in messages:
-                    if not 0.0 <= message.timestamp <= TIME_S:
+                    first_s = message.timestamp if count == 0 else first_s
+                    if not 0.0 <= message.timestamp <= TIME_S or abs(message.timestamp - first_s) > SPAN_S:
                         raise ValueError(f"time stamp {message.timestamp}")
                     if count == most and self._mode == "r":  # of a binary log the containers are bounded
                         raise ValueError("more frames than a log of this size holds; import it in parts")
