@@ -204,6 +204,8 @@ def _can(source: Path, out: Path, rig: Path) -> None:
             write_recording(whole, out, software=SOFTWARE, imported_from=source.name, started_utc=whole.started)
         print(f"{out}: {done.frames} CAN frames in {', '.join(done.streams)}{found}")
         print("".join(f"warning: {line}\n" for line in warnings), end="")
+    for line in done.remarks:
+        print(f"{source}: {line}")
     if done.damage is not None:
         raise PartialResult(f"{source}: {done.damage}; everything before it is in {out}")
 
@@ -236,6 +238,8 @@ def _log_tables(path: Path, place: tuple[str | None, int | None], rig: Path, out
     done, frames = _frames(path, rig, out)
     if done.damage is not None:
         raise RecordingError(f"{path}: {done.damage}; export the log again, or import it by itself")
+    for line in done.remarks:
+        print(f"{path}: {line}")
     log = encoder_rows(frames, encoders)
     print(
         "".join(f"{path}: warning: {line}\n" for line in (*left_out(encoder_stream(log.rows, frames)), *log.warnings)),
