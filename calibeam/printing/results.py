@@ -117,7 +117,9 @@ def _print_details(console: Console, file: DiagnosisFile) -> None:
 def print_streams(console: Console, file: DiagnosisFile) -> None:
     """Of a recording without samples: each clock with its uncertainty, findings, and what the streams do not show."""
     count = len(file.findings)
+    untested = file.streams is None or bool(file.streams.unseen)
     found = f"{counted(count, 'cause')} found" if count else "no fault found"
+    found = "no cause found in what was tested" if untested and not count else found
     console.print(f"\nStreams only: {found}; no settled poses were recorded.", style="bold", highlight=False)
     lines = [line for number, finding in enumerate(file.findings, start=1) for line in _finding(number, finding)]
     if file.streams is not None:

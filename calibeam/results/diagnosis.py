@@ -9,6 +9,7 @@ import msgspec
 import numpy as np
 
 from acquisition.recording import Recording
+from acquisition.recording.check_recording import left_out
 from acquisition.recording.motion_plan import no_torque
 from acquisition.recording.pose_plan import write_pose_plan
 from acquisition.recording.rig import Rig, rig_sha256
@@ -97,13 +98,22 @@ def diagnose_streams(
         )
     nothing = without_samples(recording.rig, recording.rig_text)
     torques = _torques_of(recording, model)
-    file = with_torques(with_streams(nothing, report), torques)
+    file = with_torques(_with_left_out(with_streams(nothing, report), recording), torques)
     if file.torques is not None:
         file = msgspec.structs.replace(file, next=tuple(one for one in file.next if one not in nothing.next))
     elif no_torque(recording.rig) and any(CURRENT in stream.values for stream in recording.streams.values()):
         file = msgspec.structs.replace(file, next=(*file.next, no_torque(recording.rig)))
     agree = file.verdict == Verdict.CONSISTENT.value
     return torques, msgspec.structs.replace(file, verdict=Verdict.UNDECIDABLE.value) if agree else file
+
+
+def _with_left_out(file: DiagnosisFile, recording: Recording) -> DiagnosisFile:
+    """With the readings of encoders that were not taken, among what the streams do not show."""
+    lines = tuple(line for stream in recording.streams.values() for line in left_out(stream))
+    if not lines or file.streams is None:
+        return file
+    streams = msgspec.structs.replace(file.streams, unseen=(*file.streams.unseen, *lines))
+    return msgspec.structs.replace(file, streams=streams)
 
 
 def without_samples(rig: Rig, text: str) -> DiagnosisFile:

@@ -14,7 +14,7 @@ import can
 import numpy as np
 
 from drivers.can_dbc.description import JointSignal
-from drivers.can_dbc.rows import EncoderRow, Reading, RowsOfFrames
+from drivers.can_dbc.rows import EncoderReading, EncoderRow, RowsOfFrames
 from drivers.cia406.codec import SPEED_LIMIT_RAD_S
 from drivers.clock import Clock
 from drivers.device import Block, Channel, Stamps, StreamDevice
@@ -165,7 +165,7 @@ class CanDbcEncoders(StreamDevice[can.BusABC]):
             )
 
     def _block(self, rows: Sequence[_TimedRow]) -> Block:
-        nothing, places = Reading(math.nan, math.nan), range(len(self.joints))
+        nothing, places = EncoderReading(math.nan, math.nan), range(len(self.joints))
         each = [[row.row.readings.get(place, nothing) for place in places] for row in rows]
         times_s = np.array([[reading.time_s for reading in row] for row in each])
         done_s = np.array([row.done_s for row in rows])

@@ -1,4 +1,4 @@
-"""A wrong start bit or byte order of a DBC signal, by its own frames: the angle jumps, and in another place it is smooth.
+"""A wrong start bit or byte order of a DBC signal, by its own frames: the angle jumps, elsewhere it would be smooth.
 
 A joint turns no faster than the speed limit, so that nearly all steps between frames of the right place are motion.
 """

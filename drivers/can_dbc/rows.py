@@ -25,7 +25,7 @@ class EncoderSignal(Protocol):
 
 
 @dataclass(frozen=True)
-class Reading:
+class EncoderReading:
     """What one frame brought: rad, NaN with the reason; s by the clock of the frames."""
 
     angle_rad: float
@@ -37,17 +37,17 @@ class Reading:
 class EncoderRow:
     """The readings by place; slip_rad (joint,), the sum of all steps that were no motion so far."""
 
-    readings: Mapping[int, Reading]
+    readings: Mapping[int, EncoderReading]
     slip_rad: tuple[float, ...]
 
     def angles_rad(self) -> tuple[float, ...]:
         """(joint,); NaN where there is none."""
-        nothing = Reading(math.nan, math.nan)
+        nothing = EncoderReading(math.nan, math.nan)
         return tuple(self.readings.get(place, nothing).angle_rad for place in range(len(self.slip_rad)))
 
     def no_reading(self) -> tuple[int, ...]:
         """(joint,); 0 where there is an angle, else the value of a `NoReading`."""
-        silent = Reading(math.nan, math.nan, NoReading.NO_ANSWER)
+        silent = EncoderReading(math.nan, math.nan, NoReading.NO_ANSWER)
         whys = (self.readings.get(place, silent).missing for place in range(len(self.slip_rad)))
         return tuple(0 if why is None else why.value for why in whys)
 
@@ -71,7 +71,7 @@ class RowsOfFrames:
         self._places: dict[tuple[int, bool], list[int]] = {}
         for place, joint in enumerate(joints):
             self._places.setdefault(joint.frame, []).append(place)
-        self._row: dict[int, Reading] = {}
+        self._row: dict[int, EncoderReading] = {}
 
     def places(self, frame: tuple[int, bool]) -> Sequence[int]:
         """The encoders in frames of this identifier."""
@@ -96,8 +96,8 @@ class RowsOfFrames:
         slips_rad = tuple(angle.slip_rad for angle in self._angles)
         return [EncoderRow(readings, slips_rad)] if readings else []
 
-    def _reading(self, place: int, counts: int | NoReading, time_s: float) -> Reading:
+    def _reading(self, place: int, counts: int | NoReading, time_s: float) -> EncoderReading:
         if isinstance(counts, NoReading):
-            return Reading(math.nan, time_s, counts)
+            return EncoderReading(math.nan, time_s, counts)
         angle_rad = self._angles[place].follow(counts, time_s)
-        return Reading(angle_rad, time_s, NoReading.TOO_FAST if math.isnan(angle_rad) else None)
+        return EncoderReading(angle_rad, time_s, NoReading.TOO_FAST if math.isnan(angle_rad) else None)

@@ -86,6 +86,15 @@ def test_a_signal_in_its_place_is_not_warned_of(tmp_path: Path, capsys: pytest.C
     np.testing.assert_allclose(read(out).streams["encoders"].values["position_rad"][:, 0], swing(), atol=0.51 * SCALE)
 
 
+def test_a_diagnosis_lists_readings_that_were_left_out(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out, _, _ = imported(tmp_path, rig(tmp_path, "8|16@0+", "0|0"), log(tmp_path, swing()), capsys)
+    assert run(["diagnose", str(out), "--out", str(tmp_path / "diagnosis.json")]) == 0
+    said = " ".join(capsys.readouterr().out.split())
+    assert "no fault" not in said
+    assert "no cause found in what was tested" in said
+    assert re.search(r"not tested: encoder 1: readings left out of 600 rows: faster than a joint turns in \d+", said)
+
+
 def test_readings_out_of_the_stated_range_are_counted_apart(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     angles_rad = swing()
     angles_rad[100:107] = 11.0  # beyond the stated 10 rad
