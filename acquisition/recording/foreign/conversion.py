@@ -20,7 +20,6 @@ from acquisition.recording.errors import RecordingError, SamplesError, shown
 from acquisition.recording.files import write_json
 from acquisition.recording.files.bounds import SPAN_S
 from acquisition.recording.files.explain import suffix_of
-from acquisition.recording.files.plausible import time_fault
 from acquisition.recording.foreign.column_meanings import (
     POSE_MATRIX,
     TEXT,
@@ -34,6 +33,7 @@ from acquisition.recording.foreign.column_meanings import (
 from acquisition.recording.foreign.heading_units import AMBIGUOUS, Unit, si_symbol, symbols, unit_of
 from acquisition.recording.foreign.rotations import CONVENTIONS, bad_matrix, bad_quaternion, of_matrices
 from acquisition.recording.foreign.sheet import Raw, Sheet
+from acquisition.recording.foreign.sheet_times import check_times
 from acquisition.recording.recording import Recording
 from acquisition.recording.rig import Rig, parse_rig
 from acquisition.recording.sample_rules import checked_samples
@@ -214,8 +214,8 @@ def converted(table: Understanding, group: Group) -> Floats:
     """(row, target) one group in SI; time counts from its first row where it counts from 1970 or the like."""
     sheet = table.sheet
     if group.meaning == TIME:
-        check_times(sheet, group)
         times = times_of(sheet, group.columns[0])
+        check_times(sheet, group.columns[0], times, unit_of(group.unit))
         return seconds_since(times, _base(times, group), group)[:, None]
     raw = np.stack([table.numbers[column] for column in group.columns], axis=1)
     unit = unit_of(group.unit) if group.suffix else None
@@ -235,17 +235,6 @@ def converted(table: Understanding, group: Group) -> Floats:
 def times_of(sheet: Sheet, column: int) -> list[Exact]:
     """The times of a column as they stand, dates as seconds since 1970. SamplesError for a cell that is none."""
     return [_time(sheet, row, column, cell) for row, cell in enumerate(sheet.cells(column))]
-
-
-def check_times(sheet: Sheet, group: Group) -> None:
-    """SamplesError for a time that cannot be, naming file, row, column, value and remedy."""
-    column, unit = group.columns[0], unit_of(group.unit)
-    try:
-        times_s = np.array([float(t) for t in times_of(sheet, column)]) * (1.0 if unit is None else unit.factor)
-    except OverflowError as error:  # a whole number of hundreds of digits
-        raise SamplesError(f"{sheet.place(None, column)}: a time has hundreds of digits; correct it") from error
-    if (fault := time_fault(times_s)) is not None:
-        raise SamplesError(f"{sheet.place(fault[0], column)}: {fault[1]}")
 
 
 def seconds_since(times: Sequence[Exact], base: Exact, group: Group) -> Floats:

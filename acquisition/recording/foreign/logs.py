@@ -25,7 +25,6 @@ from acquisition.recording.foreign.conversion import (
     EPOCH_S,
     Exact,
     Understanding,
-    check_times,
     converted,
     is_dated,
     seconds_since,
@@ -34,6 +33,7 @@ from acquisition.recording.foreign.conversion import (
 )
 from acquisition.recording.foreign.heading_units import si_symbol, unit_of
 from acquisition.recording.foreign.sheet import SUFFIXES, Raw, Sheet, read_sheet
+from acquisition.recording.foreign.sheet_times import check_times
 from acquisition.recording.mcap.layout import STREAMS_NOTE
 from acquisition.recording.mcap.scan import check_batches
 from acquisition.recording.recording import Channel, Recording, Stamps, Stream, check_declaration
@@ -173,7 +173,7 @@ def _start(tables: Sequence[Understanding]) -> LogStart:
         times = times_of(table.sheet, group.columns[0])
         if not times:
             raise SamplesError(f"{table.sheet.place()}: the table has no row; leave it out")
-        check_times(table.sheet, group)
+        check_times(table.sheet, group.columns[0], times, unit_of(group.unit))
         unit = unit_of(group.unit)
         units.append(1.0 if unit is None else unit.factor)
         ends.append((float(min(times)) * units[-1], float(max(times)) * units[-1]))
