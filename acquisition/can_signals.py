@@ -13,42 +13,45 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Protocol
 
 import numpy as np
 
 from acquisition.recording import Channel, Recording, RecordingError, Stream
 from acquisition.recording.can_frames import Frame, FrameFlag, frames_of, is_frames
+from acquisition.recording.check_recording import NO_READING
 from acquisition.recording.foreign import Sheet
 from acquisition.recording.rig.devices import EncoderDriver, EncodersDevice
-from drivers.can_dbc.description import joint_signals
+from drivers.can_dbc.description import JointSignal, joint_signals
+from drivers.can_dbc.layouts import jumps_of
+from drivers.can_dbc.rows import EncoderRow, EncoderSignal, RowsOfFrames
 from drivers.cia406 import codec
-from drivers.cia406.codec import SPEED_LIMIT_RAD_S, ContinuousAngle, Scale
+from drivers.cia406.codec import SPEED_LIMIT_RAD_S, Scale
 
 STREAM, CHANNEL = "encoders", "position_rad"
-Row = tuple[float, tuple[float, ...]]
-
 
 SDO_ANSWER, SDO_REQUEST, PDO2 = 0x580, 0x600, 0x280  # and the node: the predefined connection set of CiA 301
 SET_UP = (codec.OPERATING_PARAMETERS, codec.UNITS_PER_TURN, codec.RANGE_UNITS, codec.TURN_RESOLUTION, codec.TURNS)
 
 
+@dataclass(frozen=True)
+class Row:
+    """Host time in s; (joint,) angles in rad, NaN where there is none; (joint,) why: 0, or of `NoReading`."""
+
+    host_s: float
+    angles_rad: tuple[float, ...]
+    no_reading: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class EncoderLog:
+    """The rows of all encoders; `warnings`: signals that jump as the DBC file places them, and where they would not."""
+
+    rows: list[Row]
+    warnings: tuple[str, ...] = ()
+
+
 class NoSetUpError(RecordingError):
     """Nothing in log or rig file states what a count of the encoders is."""
-
-
-class EncoderSignal(Protocol):
-    """One encoder in the frames: of a DBC file, or a `NodePosition`."""
-
-    @property
-    def name(self) -> str: ...
-    @property
-    def frame(self) -> tuple[int, bool]: ...
-    @property
-    def scale(self) -> Scale: ...
-    @property
-    def offset_rad(self) -> float: ...
-    def counts(self, data: bytes) -> int | None: ...
 
 
 @dataclass(frozen=True)
@@ -59,15 +62,14 @@ class NodePosition:
     frame: tuple[int, bool]
     scale: Scale
     number: codec.MappedNumber
-    offset_rad: float = 0.0
 
     def counts(self, data: bytes) -> int | None:
         """None when the frame is too short."""
         return self.number.read(data)
 
 
-def encoder_rows(recording: Recording, encoders: EncodersDevice) -> list[Row]:
-    """Host time and angle of every joint, NaN where an encoder sent nothing for that row.
+def encoder_rows(recording: Recording, encoders: EncodersDevice) -> EncoderLog:
+    """Host time and angle of every joint, NaN with the reason where there is none.
 
     RecordingError where no frame is of these encoders, or several buses have them; NoSetUpError; DeviceRefused for a
     DBC file that does not fit.
@@ -88,33 +90,50 @@ def encoder_rows(recording: Recording, encoders: EncodersDevice) -> list[Row]:
     frames = [frame for bus in buses for frame in bus] if not theirs else theirs[0]
     limit = encoders.acceleration_limit_rad_s2
     sync = None if plain else codec.SYNC_ID
-    rows = list(_rows(sorted(frames, key=lambda f: f.host_s), joints, math.inf if limit is None else limit, sync))
+    frames.sort(key=lambda f: f.host_s)
+    rows = list(_rows(frames, joints, math.inf if limit is None else limit, sync))
     if not rows:
         raise RecordingError(
             f"{recording.path}: none of {len(frames)} frames is of {joints[0].name} … {joints[-1].name} of "
             f"{encoders.dbc if plain else 'CiA 406'}; check [devices.encoders] of the rig file"
         )
-    return rows
+    return EncoderLog(rows, tuple(_jumps(frames, joints)))
+
+
+def _jumps(frames: Sequence[Frame], joints: Sequence[EncoderSignal]) -> Iterator[str]:
+    for joint in joints:
+        if not isinstance(joint, JointSignal):  # CiA 406: the mapping of the encoder states the place
+            continue
+        own = [
+            frame
+            for frame in frames
+            if (frame.can_id, bool(frame.flags & FrameFlag.EXTENDED)) == joint.frame
+            and not frame.flags & (FrameFlag.REMOTE | FrameFlag.ERROR)
+            and joint.counts(frame.data) is not None
+        ]
+        jumps = jumps_of(joint, [frame.host_s for frame in own], [frame.data for frame in own])
+        if jumps is not None:
+            yield str(jumps)
 
 
 def encoder_stream(rows: list[Row], frames: Recording) -> Stream:
     """As the driver of these encoders streams them; the stamps are those of the frames, which all come of one log."""
     log = next((stream for stream in frames.streams.values() if is_frames(stream)), None)
     stamps = "unknown" if log is None else log.stamps
-    host_s = np.array([time_s for time_s, _ in rows])
-    angles_rad = np.array([angles for _, angles in rows])
-    channel = Channel(CHANNEL, "rad", angles_rad.shape[1:])
-    return Stream(
-        STREAM, (channel,), host_s, host_s, np.arange(len(rows), dtype=np.int64), {CHANNEL: angles_rad}, stamps=stamps
-    )
+    host_s = np.array([row.host_s for row in rows])
+    angles_rad = np.array([row.angles_rad for row in rows])
+    shape = angles_rad.shape[1:]
+    values = {CHANNEL: angles_rad, NO_READING: np.array([row.no_reading for row in rows], dtype=np.uint8)}
+    channels = Channel(CHANNEL, "rad", shape), Channel(NO_READING, "", shape)
+    return Stream(STREAM, channels, host_s, host_s, np.arange(len(rows), dtype=np.int64), values, stamps=stamps)
 
 
 def encoder_sheet(rows: list[Row], recording: Recording, source: Path) -> Sheet:
     """The same as a table beside other logs: times since 1970, as in the CAN log."""
     epoch = datetime.fromtimestamp(0, UTC)
     start_s = ((recording.started or epoch) - epoch).total_seconds()
-    headings = ("host [s]", *(f"enc{joint} [rad]" for joint in range(1, len(rows[0][1]) + 1)))
-    cells = tuple((start_s + time_s, *angles) for time_s, angles in rows)
+    headings = ("host [s]", *(f"enc{joint} [rad]" for joint in range(1, len(rows[0].angles_rad) + 1)))
+    cells = tuple((start_s + row.host_s, *row.angles_rad) for row in rows)
     return Sheet(source, "", headings, ("",) * len(headings), cells, tuple(range(1, len(rows) + 1)))
 
 
@@ -167,35 +186,22 @@ def _objects(frames: Iterable[Frame], node: int) -> dict[tuple[int, int], int]:
 def _rows(
     frames: Iterable[Frame], joints: Sequence[EncoderSignal], acceleration_limit: float, sync: int | None
 ) -> Iterator[Row]:
-    angles = tuple(ContinuousAngle(joint.scale, SPEED_LIMIT_RAD_S, acceleration_limit) for joint in joints)
-    places: dict[tuple[int, bool], list[int]] = {}
-    for place, joint in enumerate(joints):
-        places.setdefault(joint.frame, []).append(place)
-    row: dict[int, tuple[float, float]] = {}  # place -> angle, time
+    following = RowsOfFrames(joints, SPEED_LIMIT_RAD_S, acceleration_limit)
     latched_s: float | None = None
     for frame in frames:
         if frame.flags & (FrameFlag.REMOTE | FrameFlag.ERROR):
             continue
-        here = places.get((frame.can_id, bool(frame.flags & FrameFlag.EXTENDED)), [])
-        begins = frame.can_id == sync and not here
-        if row and (begins or any(place in row for place in here)):
-            yield _finished(row, len(joints), latched_s)
-            row, latched_s = {}, None
-        if begins:
+        known = frame.can_id, bool(frame.flags & FrameFlag.EXTENDED)
+        if frame.can_id == sync and not following.places(known):
+            yield from (_finished(row, latched_s) for row in following.finish())
             latched_s = frame.host_s
-        for place in here:
-            counts = joints[place].counts(frame.data)
-            if counts is not None:
-                angle_rad = angles[place].follow(counts, frame.host_s) + joints[place].offset_rad
-                row[place] = angle_rad, frame.host_s
-        if len(row) == len(joints):
-            yield _finished(row, len(joints), latched_s)
-            row, latched_s = {}, None
-    if row:
-        yield _finished(row, len(joints), latched_s)
+            continue
+        for row in following.take(known, frame.data, frame.host_s):
+            yield _finished(row, latched_s)
+            latched_s = None
+    yield from (_finished(row, latched_s) for row in following.finish())
 
 
-def _finished(row: dict[int, tuple[float, float]], n_joints: int, latched_s: float | None) -> Row:
-    angles = tuple(row[place][0] if place in row else math.nan for place in range(n_joints))
-    mean_s = math.fsum(time_s for _, time_s in row.values()) / len(row)
-    return mean_s if latched_s is None else latched_s, angles
+def _finished(row: EncoderRow, latched_s: float | None) -> Row:
+    mean_s = math.fsum(reading.time_s for reading in row.readings.values()) / len(row.readings)
+    return Row(mean_s if latched_s is None else latched_s, row.angles_rad(), row.no_reading())

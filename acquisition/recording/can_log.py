@@ -14,11 +14,10 @@ import zlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
-from functools import partial
 from operator import attrgetter
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
+from typing import Any, TextIO, cast
 
 import can
 import msgspec
@@ -40,8 +39,9 @@ from acquisition.recording.can_frames import (
     is_frames,
     stream_names,
 )
+from acquisition.recording.can_log_facts import AscLines, by_vector, remarks_of
 from acquisition.recording.errors import RecordingError, shown
-from acquisition.recording.files.bounds import BATCH_BYTES, FEW, MESSAGES, TABLE_BYTES, TIME_S, UNPACKED_BYTES
+from acquisition.recording.files.bounds import BATCH_BYTES, FEW, MESSAGES, SPAN_S, TABLE_BYTES, TIME_S, UNPACKED_BYTES
 from acquisition.recording.mcap.writer import RecordingWriter, StreamWriter
 from acquisition.recording.recording import Recording, Stamps, time_utc
 
@@ -115,10 +115,15 @@ MALFORMED = (  # what python-can's readers raise on lines and bytes that make no
     zlib.error,
 )
 
+
+def _asc_reader(file: Any) -> MessageReader:
+    return can.ASCReader(cast("TextIO", AscLines(file)), relative_timestamp=False)
+
+
 _READERS: Mapping[str, Callable[[Any], MessageReader]] = MappingProxyType(
     {
         ".blf": can.BLFReader,
-        ".asc": partial(can.ASCReader, relative_timestamp=False),
+        ".asc": _asc_reader,
         ".csv": can.CSVReader,
         ".log": can.CanutilsLogReader,
     }
@@ -127,19 +132,19 @@ _WRITERS: Mapping[str, Callable[[Path], MessageWriter]] = MappingProxyType(
     {".blf": can.BLFWriter, ".asc": can.ASCWriter, ".csv": can.CSVWriter, ".log": can.CanutilsLogWriter}
 )
 SUFFIXES = tuple(_READERS)
-# "application" in a BLF header (Vector, binlog_objects.h): CANalyzer, CANoe, CANlog, CANcaseXL log; python-can writes 5
-VECTOR_TOOLS = (1, 2, 4, 6)
-BLF_APPLICATION = 8  # byte of the header
-ASC_HEAD = 400  # bytes with the line "// version" of Vector's tools, which python-can does not write
 
 
 @dataclass(frozen=True)
 class CanImport:
-    """What an import brought; `damage` states where the file could not be read further."""
+    """What an import brought.
+
+    `damage` states where the file could not be read further, `remarks` what the log leaves open or its reader left out.
+    """
 
     frames: int
     streams: tuple[str, ...]
     damage: str | None
+    remarks: tuple[str, ...] = ()
 
 
 def import_can(source: Path, path: Path, *, rig_text: str, software: str) -> CanImport:
@@ -168,7 +173,9 @@ def import_can(source: Path, path: Path, *, rig_text: str, software: str) -> Can
         for inlet in inlets.values():
             inlet.write()
         writer.close(complete=log.damage is None)
-    return CanImport(sum(inlet.count for inlet in inlets.values()), tuple(survey.channels), log.damage)
+    frames = sum(inlet.count for inlet in inlets.values())
+    remarks = tuple(remarks_of(source, frames if log.damage is None else None))
+    return CanImport(frames, tuple(survey.channels), log.damage, remarks)
 
 
 def stamps_of_log(source: Path) -> Stamps:
@@ -180,16 +187,9 @@ def stamps_of_log(source: Path) -> Stamps:
     if suffix == ".log":
         return "arrived"
     try:
-        with source.open("rb") as file:
-            head = file.read(ASC_HEAD)
+        return "hardware" if by_vector(source) else "unknown"
     except OSError as error:
         raise RecordingError(f"{source}: cannot read it ({error.strerror}); check the path") from error
-    by_vector = (
-        len(head) > BLF_APPLICATION and head[BLF_APPLICATION] in VECTOR_TOOLS
-        if suffix == ".blf"
-        else suffix == ".asc" and b"// version" in head
-    )
-    return "hardware" if by_vector else "unknown"
 
 
 def export_can(recording: Recording, path: Path) -> int:
@@ -253,7 +253,7 @@ class _Log:
         self._mode = "rb" if path.suffix.lower() == ".blf" else "r"
 
     def __iter__(self) -> Iterator[can.Message]:
-        count = 0
+        count, first_s = 0, math.nan
         try:
             most = max(MESSAGES, self._path.stat().st_size // 12)
             if self._mode == "rb":
@@ -261,7 +261,8 @@ class _Log:
             # opened here: python-can leaves a file open whose beginning it does not know
             with self._path.open(self._mode) as file, self._open(file) as messages:
                 for message in messages:
-                    if not 0.0 <= message.timestamp <= TIME_S:
+                    first_s = message.timestamp if count == 0 else first_s
+                    if not 0.0 <= message.timestamp <= TIME_S or abs(message.timestamp - first_s) > SPAN_S:
                         raise ValueError(f"time stamp {message.timestamp}")
                     if count == most and self._mode == "r":  # of a binary log the containers are bounded
                         raise ValueError("more frames than a log of this size holds; import it in parts")

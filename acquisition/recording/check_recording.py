@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from acquisition.recording.can_frames import CHANNELS_NOTE, FLAGS, FrameFlag, is_frames
-from acquisition.recording.mcap.layout import MOTION_NOTE, SEGMENT_NOTE, STREAMS_NOTE
+from acquisition.recording.mcap.layout import MOTION_NOTE, READINGS_NOTE, SEGMENT_NOTE, STREAMS_NOTE
 from acquisition.recording.recording import Recording, Stream
 from acquisition.recording.samples import Floats
 from acquisition.recording.stamp_findings import stamp_findings
@@ -27,6 +27,7 @@ class Problem(enum.Enum):
     NO_SAMPLES = "no-samples"
     SATURATED = "saturated"
     ERROR_FRAMES = "error-frames"
+    READINGS = "readings-left-out"
     BURSTS = "bursts"
     CLOCK_STEP = "clock-step"
     RATE = "rate"
@@ -55,6 +56,8 @@ class Finding:
         return self.severity is Severity.ERROR
 
 
+NO_READING, NO_ANSWER = "no_reading", 1  # channel of encoders; its value where nothing came for the row
+LEFT_OUT = {2: "out of the range that the signal states", 3: "faster than a joint turns"}
 USUAL_SHARE = 0.02  # of a stream's samples may be missing without a word: settled samples average over those that came
 USUAL_GAP = 50  # samples in one gap: half a second of encoders asked every 10 ms
 
@@ -76,6 +79,8 @@ def check(recording: Recording) -> tuple[Finding, ...]:
 def _file(recording: Recording) -> Iterator[Finding]:
     for damage in recording.damage:
         yield Finding(Problem.DAMAGED, "file", damage)
+    for line in recording.notes.get(READINGS_NOTE, "").splitlines():
+        yield Finding(Problem.READINGS, "file", line, Severity.WARNING)
     if not recording.complete:
         yield Finding(
             Problem.INCOMPLETE,
@@ -96,6 +101,7 @@ def _streams(recording: Recording) -> Iterator[Finding]:
         yield from _order(where, "host_s", stream.host_s)
         yield from _saturation(recording, where, stream)
         yield from _error_frames(where, stream)
+        yield from (Finding(Problem.READINGS, where, says, Severity.WARNING) for says in left_out(stream))
 
 
 def _gaps(recording: Recording, where: str, stream: Stream) -> Iterator[Finding]:
@@ -139,6 +145,18 @@ def _error_frames(where: str, stream: Stream) -> Iterator[Finding]:
             f"{count} error frames; check termination, bit rate and cables",
             Severity.WARNING,
         )
+
+
+def left_out(stream: Stream) -> Iterator[str]:
+    """Of each encoder of which readings came and were not taken: in how many rows, and why."""
+    codes = stream.values.get(NO_READING)
+    if codes is None:
+        return
+    for number, column in enumerate(codes.reshape(len(codes), -1).astype(np.int64).T, start=1):
+        counts = {why: int(np.count_nonzero(column == code)) for code, why in LEFT_OUT.items()}
+        if any(counts.values()):
+            whys = ", ".join(f"{why} in {count}" for why, count in counts.items() if count)
+            yield f"encoder {number}: readings left out of {len(column)} rows: {whys}; check its signal and its wiring"
 
 
 def _device_times(where: str, stream: Stream) -> Iterator[Finding]:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from acquisition.recording.errors import SamplesError, shown
 from acquisition.recording.files.bounds import LENGTH_M, most_of
+from acquisition.recording.files.plausible import time_fault
 from acquisition.recording.rig import Rig
 from acquisition.recording.samples import (
     COMPLETE_PER_JOINT,
@@ -162,6 +163,8 @@ def _table_faults(table: Table, rig: Rig, needed: Sequence[str]) -> Iterator[Fau
     """The first row of every kind of fault."""
     for name in needed:
         yield from _first(np.isnan(table[name]), name, "the value is missing (empty or NaN); it is needed in every row")
+    if (fault := time_fault(table["t_s"])) is not None:
+        yield fault[0], "t_s", fault[1]
     yield from _together(table, POSITION)
     yield from _together(table, ORIENTATION)
     yield from _together(table, SPOTS)

@@ -11,7 +11,9 @@ import numpy as np
 from cyclopts import Parameter
 
 from acquisition.recording import Finding, Recording, Stream, check, read
+from acquisition.recording.check_recording import NO_ANSWER, NO_READING
 from acquisition.recording.device_clock import ClockModel, ClockStatus, clock_model
+from acquisition.recording.examination import ExaminationRecord
 from acquisition.recording.mcap import segments
 from acquisition.recording.rig import load_rig, parse_rig
 from acquisition.recording.samples import Floats
@@ -19,6 +21,7 @@ from calibeam.console import Console
 from calibeam.devices.check import check_devices
 from calibeam.outcome import CheckFailed
 from calibeam.overwriting import writes
+from calibeam.results.checked import check_examinations, verdict_lines
 from calibeam.results.controller_findings import (
     RIG_FILE,
     arm_of_controller,
@@ -58,18 +61,23 @@ def check_recording(path: Path, *, as_json: bool = False, controller_arm: Path |
                     f"--controller-arm: {other} and {first} are recordings of different rig files; give each by itself"
                 )
         findings = (*check(recording), *controller_findings(arm))
+        examinations = check_examinations(recording, findings, arm)
         good = good and not any(finding.is_error for finding in findings)
         if as_json:
-            print(msgspec.json.encode(_as_json(recording, findings)).decode())
+            print(msgspec.json.encode(_as_json(recording, findings, examinations)).decode())
         else:
-            Console(highlight=False, soft_wrap=True).print("\n".join(lines(recording, findings)), markup=False)
+            Console(highlight=False, soft_wrap=True).print(
+                "\n".join(lines(recording, findings, examinations)), markup=False
+            )
     if controller_arm is not None:
         rig = parse_rig(next(iter(rig_texts)), str(path))
         write_controller_arm(rig, arm_of_poses(rig, ControllerPoses.joined(poses)), path, controller_arm)
     return good
 
 
-def lines(recording: Recording, findings: tuple[Finding, ...]) -> list[str]:
+def lines(
+    recording: Recording, findings: tuple[Finding, ...], examinations: tuple[ExaminationRecord, ...]
+) -> list[str]:
     """For a person: the file, each stream with its rate and clock, each finding."""
     settled = f"settled samples: {len(recording.samples)}, " if recording.rig.n_joints else ""
     reported = [f"{recording.path}: {settled}events: {len(recording.events)}"]
@@ -81,11 +89,7 @@ def lines(recording: Recording, findings: tuple[Finding, ...]) -> list[str]:
     reported += [f"  {f.severity.value}: {f.problem.value}: {f.where}: {f.says}" for f in findings[:MOST_LINES]]
     if len(findings) > MOST_LINES:
         reported.append(f"  and {len(findings) - MOST_LINES} more findings; --json prints all")
-    errors = any(finding.is_error for finding in findings)
-    if errors:
-        return [*reported, "  not fit for use: errors above"]
-    warned = any(f.severity.value == "warning" for f in findings)
-    return [*reported, "  no errors; see the warnings above" if warned else "  no errors"]
+    return [*reported, *(f"  {line}" for line in verdict_lines(findings, examinations))]
 
 
 def encoder_lines(recording: Recording) -> Iterator[str]:
@@ -99,8 +103,7 @@ def encoder_lines(recording: Recording) -> Iterator[str]:
             f"period {_ms(pace.period_s)}, jitter {1e6 * pace.jitter_s:.0f} µs (1 sigma), "
             f"longest time between two rows {_ms(pace.longest_s)}"
         )
-    mute = np.isnan(device.track.values).sum(axis=0)
-    yield from (f"encoder {k + 1}: no answer in {n} rows" for k, n in enumerate(mute) if n)
+    yield from _unanswered(recording, device.track.values)
     for pair in pairs:
         against = f"encoder {pair.number} against encoder 1"
         noise = "" if pair.noise_rad is None else f"noise of a reading {angle(pair.noise_rad, 2)}; "
@@ -115,6 +118,14 @@ def encoder_lines(recording: Recording) -> Iterator[str]:
             at_s = slip.from_s - recording.host_s0, slip.to_s - recording.host_s0
             size = angle_with_sigma(slip.size_rad, slip.sigma_rad)
             yield f"{against}: slip of {size} between {at_s[0]:.2f} and {at_s[1]:.2f} s"
+
+
+def _unanswered(recording: Recording, angles_rad: Floats) -> Iterator[str]:
+    """Rows without an angle; where the recording holds no reasons, both are named. Those left out are findings."""
+    codes = next((s.values[NO_READING] for s in recording.streams.values() if NO_READING in s.values), None)
+    missing = np.isnan(angles_rad) if codes is None else codes == NO_ANSWER
+    why = "no answer" if codes is not None else "no angle (no answer, or a step faster than a joint turns)"
+    yield from (f"encoder {k + 1}: {why} in {n} rows" for k, n in enumerate(missing.sum(axis=0)) if n)
 
 
 def _rate(stream: Stream) -> str:
@@ -153,7 +164,9 @@ def _ms(seconds: float | None) -> str:
     return "-" if seconds is None else f"{1e3 * seconds:.2f} ms"
 
 
-def _as_json(recording: Recording, findings: tuple[Finding, ...]) -> dict[str, Any]:
+def _as_json(
+    recording: Recording, findings: tuple[Finding, ...], examinations: tuple[ExaminationRecord, ...]
+) -> dict[str, Any]:
     return {
         "recording": str(recording.path),
         "complete": recording.complete,
@@ -168,6 +181,7 @@ def _as_json(recording: Recording, findings: tuple[Finding, ...]) -> dict[str, A
             for stream in recording.streams.values()
         },
         "encoders": list(encoder_lines(recording)),
+        "examinations": msgspec.to_builtins(examinations),
         "findings": [
             {"severity": f.severity.value, "problem": f.problem.value, "where": f.where, "says": f.says}
             for f in findings

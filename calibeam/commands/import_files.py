@@ -16,6 +16,7 @@ from acquisition.can_signals import NoSetUpError, encoder_rows, encoder_sheet, e
 from acquisition.recording import Recording, RecordingError, SamplesError, read
 from acquisition.recording.can_log import SUFFIXES as CAN_SUFFIXES
 from acquisition.recording.can_log import CanImport, import_can
+from acquisition.recording.check_recording import left_out
 from acquisition.recording.foreign import (
     KINDS,
     ColumnsFile,
@@ -33,6 +34,7 @@ from acquisition.recording.foreign import (
     write_columns,
     write_session,
 )
+from acquisition.recording.mcap.layout import READINGS_NOTE
 from acquisition.recording.restored_stamps import NOTE as RESTORED_NOTE
 from acquisition.recording.restored_stamps import restored_stamps
 from acquisition.recording.rig import load_rig, rig_text
@@ -188,15 +190,22 @@ def _can(source: Path, out: Path, rig: Path) -> None:
         print(f"{out}: {done.frames} CAN frames in {', '.join(done.streams)}")
     else:
         done, whole = _frames(source, rig, out)
+        warnings: tuple[str, ...] = ()
         try:
-            rows = encoder_rows(whole, encoders)
-            whole = replace(whole, streams={**whole.streams, ENCODERS: encoder_stream(rows, whole)})
-            found = f", {len(rows)} rows of {ENCODERS}"
+            log = encoder_rows(whole, encoders)
+            stream, notes = encoder_stream(log.rows, whole), dict(whole.notes)
+            if log.warnings:
+                notes[READINGS_NOTE] = "\n".join(log.warnings)
+            whole = replace(whole, streams={**whole.streams, ENCODERS: stream}, notes=notes)
+            found, warnings = f", {len(log.rows)} rows of {ENCODERS}", (*left_out(stream), *log.warnings)
         except NoSetUpError as why:
             found = f"; no angles: {why}"
         with taken_back(out):
             write_recording(whole, out, software=SOFTWARE, imported_from=source.name, started_utc=whole.started)
         print(f"{out}: {done.frames} CAN frames in {', '.join(done.streams)}{found}")
+        print("".join(f"warning: {line}\n" for line in warnings), end="")
+    for line in done.remarks:
+        print(f"{source}: {line}")
     if done.damage is not None:
         raise PartialResult(f"{source}: {done.damage}; everything before it is in {out}")
 
@@ -229,7 +238,14 @@ def _log_tables(path: Path, place: tuple[str | None, int | None], rig: Path, out
     done, frames = _frames(path, rig, out)
     if done.damage is not None:
         raise RecordingError(f"{path}: {done.damage}; export the log again, or import it by itself")
-    return (encoder_sheet(encoder_rows(frames, encoders), frames, path),)
+    for line in done.remarks:
+        print(f"{path}: {line}")
+    log = encoder_rows(frames, encoders)
+    print(
+        "".join(f"{path}: warning: {line}\n" for line in (*left_out(encoder_stream(log.rows, frames)), *log.warnings)),
+        end="",
+    )
+    return (encoder_sheet(log.rows, frames, path),)
 
 
 def _folder(source: Path, out: Path, *, restore_stamps: bool) -> None:

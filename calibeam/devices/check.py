@@ -30,6 +30,7 @@ from calibeam.devices.encoders import (
     sample_noise,
     sample_rate,
     uneven_layers,
+    unread,
 )
 from calibeam.devices.instruments import camera_sight, place_of, psd_driver, psd_view, tracker_driver
 from calibeam.devices.others import other_drivers
@@ -183,9 +184,7 @@ def _encoders(device: EncodersDevice, clock: Clock) -> DeviceCheck:
     rate_hz, wrong = sample_rate(blocks, asked_hz)
     registers = {int(identity["node"]): int(identity["error_register"]) for identity in identities}
     wrong = bus_trouble(blocks[-1], registers) or wrong
-    mute = [k + 1 for k in range(q_rad.shape[1]) if np.isnan(q_rad[:, k]).all()]
-    if mute:
-        wrong = f"no answer from the encoder of joint {', '.join(map(str, mute))}: check node number, power and cable"
+    wrong = unread(blocks) or wrong
     numbers = ", ".join(str(identity.get("serial_number", "?")) for identity in identities)
     what = f"{q_rad.shape[1]} encoders on {device.interface} {device.channel}"
     what += f" (serial numbers {numbers})" if numbers else ""

@@ -14,7 +14,7 @@ from msgspec import structs
 from numpy.typing import NDArray
 
 from acquisition.recording.rig.devices import EncoderDriver, EncodersDevice
-from drivers.can_dbc.description import joint_signals
+from drivers.can_dbc.description import NoReading, joint_signals
 from drivers.can_dbc.device import CanDbcEncoders
 from drivers.cia406.codec import EMERGENCY_TEXTS
 from drivers.cia406.device import Cia406Encoders
@@ -82,6 +82,23 @@ def bus_trouble(block: Block, error_registers: Mapping[int, int]) -> str:
             return f"encoder node {node} is at fault, error register {register:02X}h: see 1003h and its manual"
     errors = int(block.values.get("bus_errors", np.zeros(1))[-1])
     return f"{errors} error frames on the bus: check termination, bit rate and cables" if errors else ""
+
+
+def unread(blocks: Sequence[Block]) -> str:
+    """Which encoders gave no angle in any row, and why, as far as their driver states it; "" where each gave one."""
+    angles_rad = np.concatenate([block.values["position_rad"] for block in blocks])
+    mute = np.flatnonzero(np.isnan(angles_rad).all(axis=0)).tolist()
+    codes = np.concatenate([b.values["no_reading"] for b in blocks]) if "no_reading" in blocks[0].values else None
+    left_out = [k + 1 for k in mute if codes is not None and (codes[:, k] != NoReading.NO_ANSWER.value).any()]
+    silent = [k + 1 for k in mute if k + 1 not in left_out]
+    if silent:
+        return f"no answer from the encoder of joint {', '.join(map(str, silent))}: check node number, power and cable"
+    if left_out:
+        return (
+            f"every reading of the encoder of joint {', '.join(map(str, left_out))} is out of the range that its "
+            "signal states, or too fast: correct range, start bit and byte order in the DBC file"
+        )
+    return ""
 
 
 VIEWED = ("position_rad",)  # channels worth a plot

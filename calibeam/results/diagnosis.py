@@ -8,7 +8,8 @@ from pathlib import Path
 import msgspec
 import numpy as np
 
-from acquisition.recording import Recording
+from acquisition.recording import Recording, check
+from acquisition.recording.checked import reading_examinations
 from acquisition.recording.examination import ExaminationRecord
 from acquisition.recording.motion_plan import no_torque
 from acquisition.recording.pose_plan import write_pose_plan
@@ -101,7 +102,7 @@ def diagnose_streams(
         )
     nothing = without_samples(recording.rig, recording.rig_text)
     torques = _torques_of(recording, model)
-    file = with_streams(nothing, report)
+    file = _with_readings(with_streams(nothing, report), recording)
     file = with_controller(with_torques(file, torques), recording) if recording.rig.n_joints else file
     if file.torques is not None:
         file = msgspec.structs.replace(file, next=tuple(one for one in file.next if one not in nothing.next))
@@ -111,6 +112,12 @@ def diagnose_streams(
     return _diagnosed_torques(torques), msgspec.structs.replace(
         file, verdict=Verdict.UNDECIDABLE.value
     ) if agree else file
+
+
+def _with_readings(file: DiagnosisFile, recording: Recording) -> DiagnosisFile:
+    """With how the examination of the encoders' readings ended: those that were left out take no part."""
+    readings = reading_examinations(recording, check(recording))
+    return msgspec.structs.replace(file, examinations=(*file.examinations, *readings))
 
 
 def without_samples(rig: Rig, text: str) -> DiagnosisFile:

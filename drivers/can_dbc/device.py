@@ -6,7 +6,7 @@ uses it at a time, except `close`.
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -14,7 +14,8 @@ import can
 import numpy as np
 
 from drivers.can_dbc.description import JointSignal
-from drivers.cia406.codec import SPEED_LIMIT_RAD_S, ContinuousAngle
+from drivers.can_dbc.rows import EncoderReading, EncoderRow, RowsOfFrames
+from drivers.cia406.codec import SPEED_LIMIT_RAD_S
 from drivers.clock import Clock
 from drivers.device import Block, Channel, Stamps, StreamDevice
 from drivers.errors import DeviceStale
@@ -25,20 +26,19 @@ BATCH_S = 0.02  # rows gathered in one block; more only delays a reader
 
 
 @dataclass(frozen=True)
-class _EncoderRow:
-    """One reading of each encoder, and the state of things at that time."""
+class _TimedRow:
+    """One row, and the state of things at that time."""
 
     sequence: int
     host_s: float  # when it was complete
     done_s: float  # the same by the clock of the stamps
-    readings: Mapping[int, tuple[float, float]]  # place -> angle, stamp
-    slip_rad: tuple[float, ...]
+    row: EncoderRow
     bus_errors: int
 
 
 class CanDbcEncoders(StreamDevice[can.BusABC]):
-    """A `drivers.device.Device`. Channels: position_rad (joint,), NaN where none came; age_s (joint,); slip_rad
-    (joint,); bus_errors, error frames so far.
+    """A `drivers.device.Device`. Channels: position_rad (joint,), NaN where there is none; no_reading
+    (joint,), why: 0 or the value of a `NoReading`; age_s (joint,); slip_rad (joint,); bus_errors, error frames so far.
 
     A row is complete when every encoder has sent, or when one sends again before the others did. Rows from before a
     failure come with the next read.
@@ -62,35 +62,37 @@ class CanDbcEncoders(StreamDevice[can.BusABC]):
         self.joints = tuple(joints)
         self.stamps: Stamps = stamps
         self._by_adapter = stamps == "hardware"
-        self.bad_frames = 0
         self._open_bus = open_bus
         self._limits = speed_limit_rad_s, acceleration_limit_rad_s2
         self._faults = BusFaults(name)
-        self._angles = self._new_angles()
-        self._places: dict[tuple[int, bool], list[int]] = {}
-        for place, joint in enumerate(self.joints):
-            self._places.setdefault(joint.frame, []).append(place)
+        self._frames = self._new_frames()
+        self._bad_before = 0
         self._sequence = 0
-        self._row: dict[int, tuple[float, float]] = {}  # place -> angle, stamp
         self._heard_s: dict[int, float] = {}
-        self._rows: list[_EncoderRow] = []
+        self._rows: list[_TimedRow] = []
+
+    @property
+    def bad_frames(self) -> int:
+        """Lines and frames that made no sense, or carry other multiplexed signals, and were left out."""
+        return self._bad_before + self._frames.bad_frames
 
     def _open(self) -> can.BusABC:
         return opened(self._open_bus, self.name)
 
     def _set_up(self, line: can.BusABC) -> None:
         """Hear every encoder once. DeviceStale naming those that are silent."""
-        self._angles = self._new_angles()
-        self._row.clear()
+        self._bad_before += self._frames.bad_frames
+        self._frames = self._new_frames()
         if self._sequence:
             self._sequence += 1  # what passed between is not known to be nothing
         self._hear_all()
 
     def describe(self) -> tuple[Channel, ...]:
         shape = (len(self.joints),)
-        count_rad = max(abs(joint.scale.unit_rad) for joint in self.joints)
+        count_rad = max(joint.resolution_rad for joint in self.joints)
         return (
             Channel("position_rad", "rad", shape, float("inf"), count_rad),
+            Channel("no_reading", "", shape),
             Channel("age_s", "s", shape),
             Channel("slip_rad", "rad", shape),
             Channel("bus_errors", ""),
@@ -133,7 +135,7 @@ class CanDbcEncoders(StreamDevice[can.BusABC]):
         try:
             return bus.recv(min(max(timeout_s, 0.0), SILENT_S))
         except (ValueError, IndexError):  # python-can's parser on a damaged line of a serial adapter
-            self.bad_frames += 1
+            self._bad_before += 1
             return None
 
     def _take(self, message: can.Message | None) -> None:
@@ -145,26 +147,12 @@ class CanDbcEncoders(StreamDevice[can.BusABC]):
             self._faults.take(message, now_s)
             return
         stamp_s = message.timestamp if self._by_adapter else now_s
-        places = self._places.get((message.arbitration_id, message.is_extended_id), [])
-        if any(place in self._row for place in places):
-            self._finish(now_s, stamp_s)
-        data = bytes(message.data)
-        for place in places:
-            counts = self.joints[place].counts(data)
-            if counts is None:
-                self.bad_frames += 1
-                continue
-            angle_rad = self._angles[place].follow(counts, stamp_s) + self.joints[place].offset_rad
-            self._row[place] = angle_rad, stamp_s
-            self._heard_s[place] = now_s
-        if len(self._row) == len(self.joints):
-            self._finish(now_s, stamp_s)
-
-    def _finish(self, now_s: float, stamp_s: float) -> None:
-        readings, self._row = self._row, {}
-        slips_rad = tuple(angle.slip_rad for angle in self._angles)
-        self._rows.append(_EncoderRow(self._sequence, now_s, stamp_s, readings, slips_rad, self._faults.count))
-        self._sequence += 1
+        frame = message.arbitration_id, message.is_extended_id
+        rows = self._frames.take(frame, bytes(message.data), stamp_s)
+        self._heard_s.update(dict.fromkeys(self._frames.last_read, now_s))
+        for row in rows:
+            self._rows.append(_TimedRow(self._sequence, now_s, stamp_s, row, self._faults.count))
+            self._sequence += 1
 
     def _check_silence(self) -> None:
         now_s = self._clock.now_s()
@@ -176,21 +164,23 @@ class CanDbcEncoders(StreamDevice[can.BusABC]):
                 "check its power, cable and termination"
             )
 
-    def _block(self, rows: Sequence[_EncoderRow]) -> Block:
-        nothing = (math.nan, math.nan)
-        each = np.array([[row.readings.get(place, nothing) for place in range(len(self.joints))] for row in rows])
+    def _block(self, rows: Sequence[_TimedRow]) -> Block:
+        nothing, places = EncoderReading(math.nan, math.nan), range(len(self.joints))
+        each = [[row.row.readings.get(place, nothing) for place in places] for row in rows]
+        times_s = np.array([[reading.time_s for reading in row] for row in each])
         done_s = np.array([row.done_s for row in rows])
         return Block(
             host_s=np.array([row.host_s for row in rows]),
-            device_s=np.nanmean(each[:, :, 1], axis=1),
+            device_s=np.nanmean(times_s, axis=1),
             sequence=np.array([row.sequence for row in rows], dtype=np.int64),
             values={
-                "position_rad": each[:, :, 0],
-                "age_s": done_s[:, None] - each[:, :, 1],
-                "slip_rad": np.array([row.slip_rad for row in rows], dtype=np.float64),
+                "position_rad": np.array([[reading.angle_rad for reading in row] for row in each]),
+                "no_reading": np.array([row.row.no_reading() for row in rows], dtype=np.uint8),
+                "age_s": done_s[:, None] - times_s,
+                "slip_rad": np.array([row.row.slip_rad for row in rows], dtype=np.float64),
                 "bus_errors": np.array([row.bus_errors for row in rows], dtype=np.uint32),
             },
         )
 
-    def _new_angles(self) -> tuple[ContinuousAngle, ...]:
-        return tuple(ContinuousAngle(joint.scale, *self._limits) for joint in self.joints)
+    def _new_frames(self) -> RowsOfFrames:
+        return RowsOfFrames(self.joints, *self._limits)

@@ -137,6 +137,7 @@ SPEED_LIMIT_RAD_S = (
 )
 READINGS_OF_A_SLIP = 3  # a glitch on the line or in the disc is gone with the next reading
 SLIPS_KEPT = 256
+NEVER_AGAIN = 1 << 66  # units: a range beyond any number of 64 bits, so that no step reaches half of it
 TIME_SCATTER_S = 0.002  # host times of SYNCs against the latching; measured: below 1 ms, busy host 2 ms
 
 
@@ -145,8 +146,10 @@ class Scale:
     """What the encoder states of its counts."""
 
     units_per_turn: float  # of CiA 406 a whole number
-    range_units: int  # the position wraps here
+    range_units: float  # the position begins again after so many; inf: it never does
     rises_counter_clockwise: bool
+    offset_units: float = 0.0  # angle = (position + offset_units) * unit_rad
+    first_near_zero: bool = True  # the first angle lies within half the range of zero; else it is as the position reads
 
     @property
     def unit_rad(self) -> float:
@@ -174,11 +177,11 @@ class Slip:
 
 # A position made continuous in units, its time in s, and how fast it was moving then, in units a second (NaN: not known
 # yet). No class: thousands a second are made of these.
-_Reading = tuple[int, float, float]
+_Reading = tuple[float, float, float]
 
 
 class ContinuousAngle:
-    """Unwraps one encoder's position. The first reading lies within half the range of zero.
+    """Unwraps one encoder's position. The offset counts before the first reading is brought near zero.
 
     Step = ((new - old + R/2) mod R) - R/2, R the range in units. A step is motion when it is no faster than the speed
     limit (over j at least: a busy host takes in one go what came one after the other) and, where an acceleration limit
@@ -197,7 +200,9 @@ class ContinuousAngle:
         self.wraps = 0
         self.slips: tuple[Slip, ...] = ()
         self.slip_rad = 0.0  # all slips together
-        self._range, self._half = scale.range_units, scale.range_units // 2
+        self._range = NEVER_AGAIN if math.isinf(scale.range_units) else scale.range_units
+        self._half = self._range // 2
+        self._offset, self._first_near_zero = scale.offset_units, scale.first_near_zero
         self._unit_rad, self._size_rad = scale.unit_rad, abs(scale.unit_rad)
         self._speed_limit_rad_s = speed_limit_rad_s
         self._acceleration_limit_rad_s2 = acceleration_limit_rad_s2
@@ -208,9 +213,11 @@ class ContinuousAngle:
         """Angle in rad for a position read at `time_s`, or NaN."""
         last = self._last
         if last is None:
-            units = (position + self._half) % self._range - self._half
+            units: float = position
+            if self._first_near_zero:
+                units -= int((position + self._offset + self._half) // self._range) * self._range
             self._last = units, time_s, math.nan
-            return units * self._unit_rad
+            return (units + self._offset) * self._unit_rad
         if self._uncertain:
             before = self._uncertain[-1]
             reading, is_motion = self._next(before, position, time_s)
@@ -240,11 +247,11 @@ class ContinuousAngle:
 
     def _accept(self, reading: _Reading) -> float:
         last, units = self._last, reading[0]
-        if last is not None:
-            self.wraps += abs(units // self._range - last[0] // self._range)
+        if last is not None and self._range < NEVER_AGAIN:
+            self.wraps += int(abs(units // self._range - last[0] // self._range))
         self._last = reading
         self._uncertain.clear()
-        return units * self._unit_rad
+        return (units + self._offset) * self._unit_rad
 
     def _next(self, before: _Reading, position: int, time_s: float) -> tuple[_Reading, bool]:
         """The reading after another, and whether the step to it is motion. Every frame comes here: no further calls."""

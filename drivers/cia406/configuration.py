@@ -158,7 +158,7 @@ def preset(encoder: EncoderObjects, scale: Scale, angle_rad: float, *, store: bo
     `store` keeps it through power-off where the encoder does not by itself; its memory wears: never in a loop.
     """
     units = round(angle_rad / scale.unit_rad)
-    encoder.write(codec.PRESET, 0, units % scale.range_units, 4)
+    encoder.write(codec.PRESET, 0, units % int(scale.range_units), 4)
     if store:
         encoder.write(codec.STORE, 1, codec.SAVE, 4)
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from calibeam.devices.encoders import bus_trouble, sample_noise, sample_rate, uneven_layers
+from calibeam.devices.encoders import bus_trouble, sample_noise, sample_rate, uneven_layers, unread
 from drivers.device import Block
 from drivers.psd_daq.messages import FaceIdentity
 from drivers.psd_faces import FaceKind
@@ -59,3 +59,17 @@ def test_encoders_and_bus_in_trouble() -> None:
     assert "joint 2 reports emergency 7320h, position error" in bus_trouble(faulty, {})
     assert "node 2 is at fault, error register 81h" in bus_trouble(Block(*np.zeros((3, 1)), calm), {1: 0, 2: 0x81})
     assert "3 error frames" in bus_trouble(Block(*np.zeros((3, 1)), calm | {"bus_errors": np.array([3])}), {})
+
+
+def test_an_encoder_whose_readings_are_all_left_out_has_not_failed_to_answer():
+    times_s = np.arange(4.0)
+    angles_rad = np.array([[0.0, np.nan, np.nan]] * 4)
+    plain = {"position_rad": angles_rad, "no_reading": np.array([[0, 2, 1], [0, 3, 1], [0, 3, 1], [0, 1, 1]])}
+    block = Block(times_s, times_s, times_s.astype(np.int64), plain)
+    assert "no answer from the encoder of joint 3" in unread([block])
+    plain["no_reading"][:, 2], angles_rad[:, 2] = 0, 1.0
+    assert "every reading of the encoder of joint 2 is out of the range" in unread([block])
+    angles_rad[1, 1] = 1.0
+    assert unread([block]) == ""
+    nodes = Block(times_s, times_s, times_s.astype(np.int64), {"position_rad": np.full((4, 1), np.nan)})
+    assert "no answer from the encoder of joint 1" in unread([nodes])

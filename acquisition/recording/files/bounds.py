@@ -15,6 +15,7 @@ ARM_M = 20.0  # a link, or what a flange or fixture carries: the longest arm (Ca
 PART_M = 1.0  # a detector's face, a probe's ball, a marker: the largest are some 0.3 m
 ANGLE_RAD = 1e5  # 16,000 turns: an encoder on the motor, over the whole travel of an axis with a gear
 TIME_S = 9e9  # s since 1970 until 2255, or since the start; nanoseconds of it fit into 64 bits
+SPAN_S = 1e8  # three years: no session lasts so long, and a time beyond counts from 1970 or the like
 SETTING_S = 1e5  # a day: of a setting such as a latency
 MASS_KG = 1e6  # the heaviest robots carry 2,300 kg
 TEMPERATURE_DEGC = 1e4  # beyond any sensor; devices' own marks for "no reading" (-999) lie within

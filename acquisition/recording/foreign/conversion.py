@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from acquisition.recording.errors import RecordingError, SamplesError, shown
 from acquisition.recording.files import write_json
+from acquisition.recording.files.bounds import SPAN_S
 from acquisition.recording.files.explain import suffix_of
 from acquisition.recording.foreign.column_meanings import (
     POSE_MATRIX,
@@ -32,13 +33,14 @@ from acquisition.recording.foreign.column_meanings import (
 from acquisition.recording.foreign.heading_units import AMBIGUOUS, Unit, si_symbol, symbols, unit_of
 from acquisition.recording.foreign.rotations import CONVENTIONS, bad_matrix, bad_quaternion, of_matrices
 from acquisition.recording.foreign.sheet import Raw, Sheet
+from acquisition.recording.foreign.sheet_times import check_times
 from acquisition.recording.recording import Recording
 from acquisition.recording.rig import Rig, parse_rig
 from acquisition.recording.sample_rules import checked_samples
 from acquisition.recording.samples import TARGET, Cell, Floats, Samples, cells_of, per_joint
 from acquisition.recording.session_folder import export
 
-EPOCH_S = 1e8  # a time beyond counts from 1970 or the like, no session lasts three years
+EPOCH_S = SPAN_S  # a time beyond counts from 1970 or the like
 FEWEST = 3  # rows whose spread shows something of their unit
 Exact = int | float | Decimal
 
@@ -213,6 +215,7 @@ def converted(table: Understanding, group: Group) -> Floats:
     sheet = table.sheet
     if group.meaning == TIME:
         times = times_of(sheet, group.columns[0])
+        check_times(sheet, group.columns[0], times, unit_of(group.unit))
         return seconds_since(times, _base(times, group), group)[:, None]
     raw = np.stack([table.numbers[column] for column in group.columns], axis=1)
     unit = unit_of(group.unit) if group.suffix else None

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.recording.errors import RecordingError, SamplesError, shown
+from acquisition.recording.files.plausible import value_fault
 from acquisition.recording.foreign.column_meanings import POSE_MATRIX, TIME, UNUSED, Group, clauses, name_of, prefix_of
 from acquisition.recording.foreign.conversion import (
     EPOCH_S,
@@ -32,6 +33,7 @@ from acquisition.recording.foreign.conversion import (
 )
 from acquisition.recording.foreign.heading_units import si_symbol, unit_of
 from acquisition.recording.foreign.sheet import SUFFIXES, Raw, Sheet, read_sheet
+from acquisition.recording.foreign.sheet_times import check_times
 from acquisition.recording.mcap.layout import STREAMS_NOTE
 from acquisition.recording.mcap.scan import check_batches
 from acquisition.recording.recording import Channel, Recording, Stamps, Stream, check_declaration
@@ -171,6 +173,7 @@ def _start(tables: Sequence[Understanding]) -> LogStart:
         times = times_of(table.sheet, group.columns[0])
         if not times:
             raise SamplesError(f"{table.sheet.place()}: the table has no row; leave it out")
+        check_times(table.sheet, group.columns[0], times, unit_of(group.unit))
         unit = unit_of(group.unit)
         units.append(1.0 if unit is None else unit.factor)
         ends.append((float(min(times)) * units[-1], float(max(times)) * units[-1]))
@@ -204,6 +207,7 @@ def _stream(table: Understanding, base: Exact) -> Stream:
         if group.meaning in (TIME, UNUSED):
             continue
         for channel, array in _channels(table, group):
+            _check_values(table, group, channel, array)
             channels.append(channel)
             values[channel.name] = array
     device_s = host_s
@@ -219,6 +223,16 @@ def _stream(table: Understanding, base: Exact) -> Stream:
     except ValueError as error:
         raise SamplesError(f"{sheet.place()}: {shown(str(error), 160)}; rename a column") from error
     return Stream(name, tuple(channels), host_s, device_s, np.arange(len(host_s), dtype=np.int64), values)
+
+
+def _check_values(table: Understanding, group: Group, channel: Channel, values: NDArray[Any]) -> None:
+    """SamplesError for a value that the quantity cannot have; a unit that a person has stated does not change that."""
+    fault = value_fault(channel.name, values)
+    if fault is not None:
+        row, element, says = fault
+        place = group.joints.index(element + 1) if group.joints else element
+        column = group.columns[min(place, len(group.columns) - 1)]
+        raise SamplesError(f"{table.sheet.place(row, column)}: {says}")
 
 
 def _channels(table: Understanding, group: Group) -> Iterator[tuple[Channel, NDArray[Any]]]:

@@ -122,6 +122,7 @@ END_METADATA = "calibeam.end"  # complete: "true" or "false"
 
 MOTION_NOTE = "motion_plan"  # note of a motion that was run for its torques, with its text: no samples either
 STREAMS_NOTE = "imported_streams"  # note of an import of logs: there are no samples in it
+READINGS_NOTE = "encoder_readings"  # note of an import of CAN frames: what is wrong with the angles, a line each
 SEGMENT_NOTE, BEFORE_NOTE = "segment", "segment_before"  # notes of a log: its number, the file that it goes on after
 CHECKSUM = "crc32"  # key in every metadata record: of its other keys and values, eight hexadecimal digits
 

@@ -32,6 +32,7 @@ from acquisition.recording.files.bounds import (
     Sentence,
 )
 from acquisition.recording.files.json_file import JsonKind, read_json
+from acquisition.recording.files.plausible import time_fault, value_fault
 from acquisition.recording.files.table_file import check_cells, parquet_table
 from acquisition.recording.recording import (
     Channel,
@@ -209,12 +210,19 @@ def _stream(
         raise RecordingError(f"{path}: no column 'sequence', which numbers the rows; {KIND.again}")
     host_s = columns["host_s"]
     device_s = columns.get("device_s", np.full(len(host_s), math.nan))
-    if np.any(bad := ~(np.abs(host_s) <= TIME_S)):
-        row = int(np.argmax(bad))
-        raise RecordingError(f"{path} row {row + 1}, column 'host_s': {host_s[row]}; a time is a number of seconds")
-    if np.any(bad := np.abs(device_s) > TIME_S):
+    if np.any(missing := np.isnan(host_s)):
+        row = int(np.argmax(missing))
+        raise RecordingError(f"{path} row {row + 1}, column 'host_s': nan; a time is a number of seconds")
+    if (fault := time_fault(host_s)) is not None:
+        raise RecordingError(f"{path} row {fault[0] + 1}, column 'host_s': {fault[1]}")
+    if np.any(bad := np.abs(device_s) > TIME_S):  # of any clock, which may have been set
         row = int(np.argmax(bad))
         raise RecordingError(f"{path} row {row + 1}, column 'device_s': {device_s[row]}; at most {TIME_S:g} s")
+    exported = (path.parent / ABOUT).is_file()
+    for channel in channels:
+        if (found := value_fault(channel.name, values[channel.name], infinite=exported)) is not None:
+            row, element, says = found
+            raise RecordingError(f"{path} row {row + 1}, column '{scalar_names(channel)[element]}': {says}")
     return Stream(name, channels, host_s, device_s, columns["sequence"], values, gaps.get(name, ()))
 
 
