@@ -22,8 +22,7 @@ from calibeam.results.motion_reconciliation import (
 from calibeam.results.reconciliation import Reconciled, reconcile
 from calibeam.results.reconciliation_page import write_reconciliation_page
 from calibeam.simulation.replayed_recording import write_replayed
-from calibrate.compare.examinations import examined
-from calibrate.compare.reconciled_rows import ReconcileFile
+from calibrate.compare.reconciled_rows import ReconcileFile, examined
 from calibrate.diagnose.motion import model_of_motion, with_torques
 from calibrate.diagnose.record.file import write_diagnosis
 from calibrate.errors import DataError

@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 from acquisition.recording import Finding, Recording
+from acquisition.recording.check_recording import Problem
 from acquisition.recording.checked import RECORDING_EXAMINATIONS, recording_examinations
 from acquisition.recording.examination import (
     FOUND,
@@ -39,7 +40,8 @@ def _pairs(checked: CheckedRecording) -> Iterator[ExaminationRecord]:
     alone = checked.recording.rig.n_joints == 0
     device = devices_of(checked.recording).get("encoders") if alone else None
     if device is None:
-        yield PAIRS.not_examined("no log of encoders alone", expected=False)
+        if alone:
+            yield PAIRS.not_examined("no readings of encoders were recorded")
         return
     for pair in examine_encoders(device)[1]:
         where = f"encoder {pair.number}"
@@ -54,8 +56,6 @@ def _pairs(checked: CheckedRecording) -> Iterator[ExaminationRecord]:
 def _controller(checked: CheckedRecording) -> Iterator[ExaminationRecord]:
     if checked.recording.rig.n_joints:
         yield controller_examination(checked.recording, checked.arm)
-    else:
-        yield CONTROLLER_ARM.not_examined("the rig has no arm", expected=False)
 
 
 BEYOND_THE_RECORDING: tuple[tuple[Examination, Callable[[CheckedRecording], Iterator[ExaminationRecord]]], ...] = (
@@ -68,7 +68,7 @@ CHECK_EXAMINATIONS = tuple(one for one, _ in (*RECORDING_EXAMINATIONS, *BEYOND_T
 def check_examinations(
     recording: Recording, findings: tuple[Finding, ...], arm: ControllerArm | None
 ) -> tuple[ExaminationRecord, ...]:
-    """The endings of all examinations of `check`."""
+    """The endings of all examinations of `check` that are about something that the rig has."""
     checked = CheckedRecording(recording, findings, arm)
     beyond = (record for _, examine in BEYOND_THE_RECORDING for record in examine(checked))
     return (*recording_examinations(recording, findings), *beyond)
@@ -79,6 +79,8 @@ def verdict_lines(findings: Sequence[Finding], examinations: Sequence[Examinatio
     yield from not_examined_lines(examinations)
     if any(finding.is_error for finding in findings):
         yield "not fit for use: errors above"
+    elif any(finding.problem is Problem.READINGS for finding in findings):
+        yield "readings were left out; see the warnings above"
     elif not examined_names(examinations):
         yield "nothing was examined: the reasons are above"
     elif not all_examined(examinations):

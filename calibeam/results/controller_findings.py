@@ -24,7 +24,7 @@ RIG_FILE = toml_output(("schema", "arm"), "rig file")
 CONTROLLER_ARM = Examination(
     "arm of the controller",
     CONTROLLER,
-    f"record the robot with its tool poses in {FEWEST} or more different poses (columns {', '.join(CONTROLLER)})",
+    f"record the robot with its tool poses (controller_x_m … controller_rz_rad) in {FEWEST} or more different poses",
 )
 UNRELATED_M = 1e-3  # no arm leaves as much; angles and poses of other times do
 MOST = 8  # differences in one sentence

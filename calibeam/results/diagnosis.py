@@ -9,12 +9,12 @@ import msgspec
 import numpy as np
 
 from acquisition.recording import Recording, check
-from acquisition.recording.checked import reading_examinations
+from acquisition.recording.checked import READINGS, reading_examinations
 from acquisition.recording.examination import ExaminationRecord
 from acquisition.recording.motion_plan import no_torque
 from acquisition.recording.pose_plan import write_pose_plan
 from acquisition.recording.rig import Rig, rig_sha256
-from calibeam.results.controller_findings import controller_notes, with_controller
+from calibeam.results.controller_findings import CONTROLLER_ARM, controller_notes, with_controller
 from calibeam.software import SOFTWARE
 from calibrate.diagnose.assess import Verdict
 from calibrate.diagnose.from_recording import Diagnosed, diagnose_samples
@@ -27,7 +27,7 @@ from calibrate.diagnose.motion import (
 )
 from calibrate.diagnose.new_poses import plan_of, separating
 from calibrate.diagnose.record.file import write_diagnosis
-from calibrate.diagnose.record.pose_examinations import pose_examinations
+from calibrate.diagnose.record.pose_examinations import POSE_EXAMINATIONS, pose_examinations
 from calibrate.diagnose.record.schema import (
     SCHEMA,
     TORQUES_IN_MOTION,
@@ -38,7 +38,7 @@ from calibrate.diagnose.record.schema import (
 )
 from calibrate.diagnose.record.to_file import file_of
 from calibrate.diagnose.stages import Stage, Stages
-from calibrate.diagnose.streams import streams_of, with_streams
+from calibrate.diagnose.streams import STREAM_EXAMINATIONS, streams_of, with_streams
 from calibrate.diagnose.with_model import known_before, model_of_diagnosis, only_new, with_known_model
 from calibrate.errors import DataError
 from calibrate.model.model_file import ModelFile, read_model
@@ -50,6 +50,12 @@ SEED = 1  # of nulls, splits and bootstraps: the same recording always gives the
 
 Keep = Callable[[DiagnosisFile], None]
 
+DIAGNOSE_EXAMINATIONS = (
+    *(one for one, _ in (*POSE_EXAMINATIONS, *STREAM_EXAMINATIONS)),
+    READINGS,
+    TORQUES_IN_MOTION,
+    CONTROLLER_ARM,
+)
 REPORT = "report the recording as a fault of the program"
 NEXT_OF_AN_ARM = "record settled samples: streams alone show clocks, lags and faults, nothing of the geometry"
 NEXT_OF_ENCODERS = (

@@ -1,16 +1,20 @@
-"""How the examinations of a comparison and of a reconciliation ended."""
+"""How the examinations of a comparison ended."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
-import numpy as np
 from msgspec import structs
 
 from acquisition.recording import Recording
-from acquisition.recording.examination import Examination, ExaminationRecord
+from acquisition.recording.examination import (
+    Examination,
+    ExaminationRecord,
+    all_examined,
+    examined_names,
+    not_examined,
+)
 from calibrate.compare.comparison_file import ComparisonFile, DifferenceRecord, Level
 from calibrate.compare.encoder_zeros import ZERO, ZeroChange
-from calibrate.compare.reconciled_rows import AGREES, ReconcileFile
 from calibrate.diagnose.assess import Verdict
 from calibrate.diagnose.record.schema import TORQUES_IN_MOTION
 from calibrate.diagnose.streams import devices_of
@@ -29,14 +33,16 @@ SECOND_ZEROS = Examination(
     ("enc", "q"),
     "give two recordings with both encoders of the joints over ten seconds or more of motion",
 )
-POSES = Examination("settled poses", ("q", "readings"), "record settled samples, and measure more poses")
 IN_SAMPLES = frozenset((Level.RIG, Level.JOINT_ZEROS, Level.LINKS, Level.ENCODER_ZEROS, Level.FRAMES, Level.JOINTS))
 WITHOUT_STREAMS = "not both of the two have streams"
+Records = Iterator[ExaminationRecord]
+ANGLES = ("command", "joints", "encoders")  # links that are no reading of an instrument
+DEVICES = ("command", "joints", "encoders", "spots")
 IN_CAUSES = frozenset((Level.EFFECTS, Level.UNEXPLAINED))
 
 
 @dataclass(frozen=True, eq=False)
-class Compared:
+class ComparedPair:
     """The file and what it was made of; `simulated` None: a description of torques alone."""
 
     file: ComparisonFile
@@ -55,78 +61,93 @@ class Compared:
         return self.simulated is not None and all(device in devices_of(r) for r in (self.measured, self.simulated))
 
 
-def _readings(asked: Compared) -> ExaminationRecord:
-    if not asked.file.matched or not asked.file.links:
+def _readings(asked: ComparedPair) -> Records:
+    links = [one for one in asked.file.links if one.link not in ANGLES]
+    if not asked.file.matched or not links:
         held = len(asked.measured.samples) > 0
         why = "no rows of the two were compared" if held else "no settled samples were recorded"
-        return READINGS.not_examined(why, expected=held and asked.simulated is not None)
-    found = asked.differences(IN_SAMPLES)
+        why = "the two share no reading of an instrument" if asked.file.matched else why
+        yield READINGS.not_examined(why, expected=held and asked.simulated is not None)
+        return
+    found = [one.says for one in asked.differences(IN_SAMPLES)]
+    found += [f"{one.link} differs by {one.rms_own:.3g} {one.unit} rms" for one in asked.file.links if one.parts]
     if found:
-        return READINGS.found("; ".join(one.says for one in found))
-    noise = [(r.noise if r.noise is not None else r.rms_coordinate_after, r.unit) for r in asked.file.readings]
-    noise += [(one.scatter, "") for one in asked.file.links if not noise]
-    limit, unit = max(((n, u) for n, u in noise if np.isfinite(n)), default=(None, ""))
-    if limit is None:
-        return READINGS.not_examined("the two share no reading")
-    return READINGS.nothing(limit, unit)
+        yield READINGS.found("; ".join(found))
+    else:
+        widest = max(links, key=lambda one: one.noise or one.rms_own)
+        yield READINGS.nothing(widest.noise or widest.rms_own, widest.unit)
 
 
-def _causes(asked: Compared) -> ExaminationRecord:
+def _causes(asked: ComparedPair) -> Records:
     found = asked.differences(IN_CAUSES)
     if found:
-        return CAUSES.found("; ".join(one.says for one in found))
+        yield CAUSES.found("; ".join(one.says for one in found))
+        return
     diagnosis = asked.file.diagnosis
     if diagnosis is None:
         undecided = asked.file.verdict == Verdict.UNDECIDABLE.value
         why = asked.file.says if asked.file.matched and undecided else "no cause was sought beside the samples"
-        return CAUSES.not_examined(why, expected=asked.file.matched > 0)
+        yield CAUSES.not_examined(why, expected=asked.file.matched > 0)
+        return
     failed = "; ".join(f"{one.stage}: {one.reason}" for one in diagnosis.incomplete)
     if failed:
-        return CAUSES.not_examined(failed)
+        yield CAUSES.not_examined(failed)
+        return
     limits = "; ".join(f"{s.physics} at {s.where}: {s.parameter} {s.value:.3g}" for s in diagnosis.smallest[:3])
     if not limits:
-        return CAUSES.not_examined("these poses show no cause of the catalogue")
-    return CAUSES.nothing(None, "", says=limits)
+        yield CAUSES.not_examined("these poses show no cause of the catalogue")
+        return
+    yield CAUSES.nothing(None, "", says=limits)
 
 
-def _streams(asked: Compared) -> ExaminationRecord:
-    found = asked.differences(frozenset((Level.STREAMS,)))
+def _streams(asked: ComparedPair) -> Records:
+    by_name = {one.stream: one for one in asked.file.streams}
+    found = list(asked.differences(frozenset((Level.STREAMS,))))
     if found:
-        return STREAMS.found("; ".join(one.says for one in found))
-    both = asked.simulated is not None and bool(asked.measured.streams and asked.simulated.streams)
-    compared = [one for one in asked.file.streams if one.noise is not None and one.parts is not None]
-    if not compared:
-        status = "; ".join(f"{one.stream}: {one.status}" for one in asked.file.streams)
-        why = f"no stream of the two shows one motion{f' ({status})' if status else ''}" if both else WITHOUT_STREAMS
-        return STREAMS.not_examined(why, expected=both)
-    worst = max(compared, key=lambda one: one.noise or 0.0)
-    return STREAMS.nothing(worst.noise, worst.unit)
+        yield STREAMS.found("; ".join(one.says for one in found))
+    recorded = [name for name in DEVICES if asked.has(name)]
+    if not recorded:
+        yield STREAMS.not_examined(WITHOUT_STREAMS, expected=False)
+    for name in recorded:
+        one = by_name.get(name)
+        if one is not None and one.noise is not None and one.parts is not None:
+            yield STREAMS.nothing(one.noise, one.unit, name)
+        elif not asked.both_have(name):
+            yield STREAMS.not_examined("only one of the two has it", name)
+        elif not found:
+            why = "the two were not sent the same motion" if one is None or one.noise is not None else one.status
+            yield STREAMS.not_examined(why, name)
 
 
-def _second_zeros(asked: Compared) -> ExaminationRecord:
+def _second_zeros(asked: ComparedPair) -> Records:
     found = [one.says for one in asked.file.differences if one.physics == ZERO]
     if found:
-        return SECOND_ZEROS.found("; ".join(found))
+        yield SECOND_ZEROS.found("; ".join(found))
+        return
     if not asked.both_have("encoders"):
-        return SECOND_ZEROS.not_examined("not both of the two have second encoders", expected=asked.has("encoders"))
+        yield SECOND_ZEROS.not_examined("not both of the two have second encoders", expected=asked.has("encoders"))
+        return
     if not asked.zeros:
-        return SECOND_ZEROS.not_examined("in one of the two the offsets are not determined")
-    return SECOND_ZEROS.nothing(max(one.limit_rad for one in asked.zeros), "rad")
+        yield SECOND_ZEROS.not_examined("in one of the two the offsets are not determined")
+        return
+    yield SECOND_ZEROS.nothing(max(one.limit_rad for one in asked.zeros), "rad")
 
 
-def _torques(asked: Compared) -> ExaminationRecord:
+def _torques(asked: ComparedPair) -> Records:
     compared = asked.file.torques
     if compared is None:
         held = "torque" in devices_of(asked.measured)
         why = "no description of the simulation's torques was given" if held else "no torques were recorded"
         remedy = "give --simulation FILE (URDF or MJCF)" if held else ""
-        return TORQUES_IN_MOTION.not_examined(why, expected=False, remedy=remedy)
+        yield TORQUES_IN_MOTION.not_examined(why, expected=False, remedy=remedy)
+        return
     if asked.file.verdict != Verdict.CONSISTENT.value:
-        return TORQUES_IN_MOTION.found(asked.file.says)
-    return TORQUES_IN_MOTION.nothing(max(one.noise_nm for one in compared.joints), "Nm")
+        yield TORQUES_IN_MOTION.found(asked.file.says)
+        return
+    yield TORQUES_IN_MOTION.nothing(max(one.noise_nm for one in compared.joints), "Nm")
 
 
-COMPARE_EXAMINATIONS: tuple[tuple[Examination, Callable[[Compared], ExaminationRecord]], ...] = (
+COMPARE_EXAMINATIONS: tuple[tuple[Examination, Callable[[ComparedPair], Records]], ...] = (
     (READINGS, _readings),
     (CAUSES, _causes),
     (STREAMS, _streams),
@@ -139,30 +160,19 @@ def with_examinations(
     file: ComparisonFile, measured: Recording, simulated: Recording | None, zeros: Sequence[ZeroChange] = ()
 ) -> ComparisonFile:
     """The comparison with how each examination ended; `zeros`: of the second encoders, between the two."""
-    asked = Compared(file, measured, simulated, zeros)
-    return structs.replace(file, examinations=tuple(examine(asked) for _, examine in COMPARE_EXAMINATIONS))
+    asked = ComparedPair(file, measured, simulated, zeros)
+    records = tuple(record for _, examine in COMPARE_EXAMINATIONS for record in examine(asked))
+    return _with_verdict(structs.replace(file, examinations=records))
 
 
-def examined(file: ReconcileFile, torques: ExaminationRecord | object) -> ReconcileFile:
-    """The reconciliation with how its two examinations ended. `torques`: why those took no part, where they did not."""
-    return structs.replace(file, examinations=(_of_poses(file), _of_torques(file, torques)))
-
-
-RECONCILE_EXAMINATIONS = (POSES, TORQUES_IN_MOTION)
-
-
-def _of_poses(file: ReconcileFile) -> ExaminationRecord:
-    if file.unseen:
-        worst = max(file.unseen, key=lambda one: one.noise_m)
-        left = "; ".join(file.remains)
-        return POSES.found(left) if left else POSES.nothing(AGREES * worst.noise_m, "m")
-    why = "; ".join(file.remains) if file.all_rows or not file.torques else "no settled samples were recorded"
-    return POSES.not_examined(why or "too few rows", expected=not file.torques or bool(file.all_rows))
-
-
-def _of_torques(file: ReconcileFile, left_out: ExaminationRecord | object) -> ExaminationRecord:
-    if isinstance(left_out, ExaminationRecord):
-        return left_out
-    left = "; ".join(one for one in file.remains if "orque" in one)
-    noise_nm = max((one.noise_nm for one in file.torques), default=0.0)
-    return TORQUES_IN_MOTION.found(left) if left else TORQUES_IN_MOTION.nothing(AGREES * noise_nm, "Nm")
+def _with_verdict(file: ComparisonFile) -> ComparisonFile:
+    """The two agree only where all that both allow was examined; without readings or torques nothing is decided."""
+    if file.verdict != Verdict.CONSISTENT.value or all_examined(file.examinations):
+        return file
+    deciding = (READINGS.what, TORQUES_IN_MOTION.what, SECOND_ZEROS.what, STREAMS.what)
+    names = [one for one in examined_names(file.examinations) if one in deciding]
+    left = ", ".join(dict.fromkeys(one.what for one in not_examined(file.examinations) if one.expected))
+    if not names:
+        return structs.replace(file, verdict=Verdict.UNDECIDABLE.value, says=f"Not examined: {left}.")
+    says = f"No difference was found in what was examined ({', '.join(names)}); not examined: {left}."
+    return structs.replace(file, says=says)

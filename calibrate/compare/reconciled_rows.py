@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from acquisition.recording import Recording, Samples
-from acquisition.recording.examination import ExaminationRecord
+from acquisition.recording.examination import Examination, ExaminationRecord
 from acquisition.recording.rig import Rig
 from acquisition.recording.samples import ORIENTATION, POSITION, SPOTS, WIRE
 from calibrate.compare.comparison_file import ComparisonFile
@@ -23,7 +23,7 @@ from calibrate.compare.matched import (
 from calibrate.diagnose import limits
 from calibrate.diagnose.assess import Verdict
 from calibrate.diagnose.motion import JointTorquesRecord
-from calibrate.diagnose.record.schema import DiagnosisFile
+from calibrate.diagnose.record.schema import TORQUES_IN_MOTION, DiagnosisFile
 from calibrate.errors import DataError
 from calibrate.model.sensors import (
     full_pose,
@@ -290,3 +290,29 @@ def verdict_text(records: tuple[UnseenRowsRecord, ...], before: ComparisonFile, 
     if before.verdict == Verdict.CONSISTENT.value:
         return f"Simulation and recording agree as they are: {far}."
     return f"With what was found the simulation agrees with the recording: {far}."
+
+
+POSES = Examination("settled poses", ("q", "readings"), "record settled samples, and measure more poses")
+RECONCILE_EXAMINATIONS = (POSES, TORQUES_IN_MOTION)
+
+
+def examined(file: ReconcileFile, torques: ExaminationRecord | object) -> ReconcileFile:
+    """The reconciliation with how its two examinations ended. `torques`: why those took no part, where they did not."""
+    return msgspec.structs.replace(file, examinations=(_of_poses(file), _of_torques(file, torques)))
+
+
+def _of_poses(file: ReconcileFile) -> ExaminationRecord:
+    if file.unseen:
+        worst = max(file.unseen, key=lambda one: one.noise_m)
+        left = "; ".join(file.remains)
+        return POSES.found(left) if left else POSES.nothing(AGREES * worst.noise_m, "m")
+    why = "; ".join(file.remains) if file.all_rows or not file.torques else "no settled samples were recorded"
+    return POSES.not_examined(why or "too few rows", expected=not file.torques or bool(file.all_rows))
+
+
+def _of_torques(file: ReconcileFile, left_out: ExaminationRecord | object) -> ExaminationRecord:
+    if isinstance(left_out, ExaminationRecord):
+        return left_out
+    left = "; ".join(one for one in file.remains if "orque" in one)
+    noise_nm = max((one.noise_nm for one in file.torques), default=0.0)
+    return TORQUES_IN_MOTION.found(left) if left else TORQUES_IN_MOTION.nothing(AGREES * noise_nm, "Nm")

@@ -19,7 +19,6 @@ from calibrate.diagnose.streams import (
     StreamFinding,
     StreamReport,
     Track,
-    TrackCurve,
     clock_between,
     white_noise,
 )
@@ -74,7 +73,7 @@ def stream_pair(name: str, measured: StreamDevice, simulated: StreamDevice) -> S
     clock = clock_between(two, one) if one.channels == two.channels else ClockFit(ClockStatus.UNRELATED)
     if clock.offset_s is None:
         return StreamPair(name, one.unit, clock, 0, None, None, None, None, None, None)
-    left = one.values - TrackCurve(two).at(clock.to_reference(one.time_s))
+    left = one.values - two.curve.at(clock.to_reference(one.time_s))
     good = np.all(np.isfinite(left), axis=1)
     left, time_s = left[good], one.time_s[good]
     noise = np.hypot(white_noise(one.values), white_noise(two.values))
@@ -158,7 +157,7 @@ def noise_differences(
 ) -> tuple[NoiseDifference, ...]:
     """Of devices that both have, where one is clearly noisier."""
     out: list[NoiseDifference] = []
-    for name in measured.keys() & simulated.keys():
+    for name in (name for name in ORDER if name in measured and name in simulated):
         one, two = (float(np.median(white_noise(side[name].track.read().values))) for side in (measured, simulated))
         if max(one, two) > FINEST and max(one, two) > NOISIER * min(one, two):
             out.append(NoiseDifference(name, measured[name].track.unit, one, two))

@@ -91,5 +91,5 @@ def test_a_recording_without_motion_is_refused(tmp_path):
     still = recorded(Hidden(), length_s=2.0)
     values = still.streams["robot"].values
     values["actual_q_rad"][:] = values["actual_q_rad"][0]
-    with pytest.raises(DataError, match="no torques beside joint angles in motion"):
+    with pytest.raises(DataError, match="torques are not compared: no joint moves"):
         compare_torques(still, simulation(tmp_path), None)

@@ -113,6 +113,9 @@ def filtered_of(recording: Recording) -> Filtered | ExaminationRecord:
     torques = _on_clock_of(joints, torque)
     if torques is None:
         return _left_out("nothing shows how the clocks of angles and torques differ", ANGLES)
+    valid = torques.read().values
+    if not len(valid) or not np.any(np.ptp(valid, axis=0) > 0.0):
+        return _left_out("the torques have no valid reading that changes", LONGER)
     there = np.full(n, -1)
     there[[torques.joint(k) - 1 for k in range(torques.channels)]] = np.arange(torques.channels)
     first = max(joints.track.time_s[0], torques.time_s[0])

@@ -19,7 +19,6 @@ from scipy.linalg import orth
 
 from calibrate.diagnose.streams import limits
 from calibrate.diagnose.streams.clock import RobustLine, fit
-from calibrate.diagnose.streams.encoder_pairs import UNLIKE
 from calibrate.diagnose.streams.following import course_of
 from calibrate.diagnose.streams.track import Outcome, Track
 from calibrate.model.effects.term import Size
@@ -116,15 +115,15 @@ def angle_offsets(
 
 def _difference(values: Floats, q: Floats, *, wraps: bool) -> tuple[Floats, str]:
     """(row,) reading less the other, and why there is none. Of a reading that wraps modulo a turn about its middle."""
-    if np.ptp(values) == 0.0 and np.ptp(q) > limits.STANDS_RAD:
-        return values, "the reading never changes while the other one does"
+    if (np.ptp(values) == 0.0) != (np.ptp(q) == 0.0) and max(np.ptp(values), np.ptp(q)) > limits.STANDS_RAD:
+        return values, "one of the two readings never changes while the other one does"
     if not wraps:
         return values - q, ""
     turns = (np.unwrap(values) - values.mean()) @ (q - q.mean())
     difference = values - (1.0 if turns >= 0.0 else -1.0) * q
     middle = float(np.angle(np.mean(np.exp(1j * difference))))
     difference = middle + (difference - middle + np.pi) % TURN_RAD - np.pi
-    unlike = float(np.std(difference)) > max(UNLIKE * float(np.std(q)), limits.STANDS_RAD)
+    unlike = float(np.std(difference)) > max(limits.UNLIKE * float(np.std(q)), limits.STANDS_RAD)
     return difference, "the second reading does not follow the joint one to one" if unlike else ""
 
 

@@ -20,6 +20,7 @@ from calibrate.diagnose.streams import limits
 from calibrate.diagnose.streams.clock import RobustLine, fit
 from calibrate.diagnose.streams.track import Outcome, Track
 
+FEWEST_BLOCKS = 5  # of time, beside the numbers that are fitted
 FOLDS = 20  # stretches of the motion that are left out in turn; one for each block takes minutes for a long recording
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
@@ -61,6 +62,8 @@ def deflections(second: Track, first: Track, torque: Track) -> tuple[Deflection,
 
 def _of_joint(joint: int, columns: Floats, parted: Floats, block: Ints, joints: int) -> Deflection:
     """`columns` (row, 4): torque, speed, sine and cosine of the angle. `joints`: how many are tested."""
+    if len(np.unique(block)) <= FEWEST_BLOCKS or np.ptp(columns[:, 0]) == 0.0:
+        return Deflection(joint, Outcome.NOT_DETERMINABLE)
     line = _fitted(columns, parted, block)
     before, after = (_unseen(some, parted, block) for some in (columns[:, 1:], columns))
     if line is None or before is None or after is None or not np.all(np.isfinite(line.sigma)):

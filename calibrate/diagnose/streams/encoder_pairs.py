@@ -14,8 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from calibrate.diagnose.streams import limits
 from calibrate.diagnose.streams.clock import fit
-from calibrate.diagnose.streams.limits import USUAL_DISC_RAD
 from calibrate.diagnose.streams.recorded import StreamDevice
 from calibrate.diagnose.streams.slips import Slip, steps_in
 from calibrate.diagnose.streams.track import white_noise
@@ -27,7 +27,6 @@ INTERVALS = 200  # of time, between which steps are sought
 BLOCKS = 40  # of time that are left out in turn, for the sigma
 FEWEST = 4 * INTERVALS  # rows
 MOVES_RAD = 0.02  # more than discs off their centres differ by; below, the shaft stands
-UNLIKE = 0.05  # of the motion: what differs by more does not follow the same shaft one to one
 BEYOND = 5.0  # of what is left of the difference, for a step
 TURN_RAD = 2.0 * np.pi
 
@@ -82,11 +81,11 @@ def _pair(device: StreamDevice, k: int) -> EncoderPair:
     d = other_moves - sense * q_moves
     noise = float(white_noise(d[:, None])[0]) / np.sqrt(2.0)
     moves = max(float(np.ptp(q)), float(np.ptp(other))) > MOVES_RAD
-    if moves and float(np.std(d)) > max(UNLIKE * float(np.std(q)), BEYOND * noise):
+    if moves and float(np.std(d)) > max(limits.UNLIKE * float(np.std(q)), BEYOND * noise):
         return EncoderPair(
             k + 1, why=f"it does not follow encoder 1 one to one (they differ by {np.std(d):.3g} rad rms)"
         )
-    turned, level = float(np.ptp(q)), _level(other - sense * q, USUAL_DISC_RAD)
+    turned, level = float(np.ptp(q)), _level(other - sense * q, limits.USUAL_DISC_RAD)
     if turned < TURN_RAD:
         why = f"eccentricity: the shaft turns through {np.degrees(turned):.0f}°, not 360°"
         return EncoderPair(k + 1, noise_rad=noise, why=why, level_rad=level)

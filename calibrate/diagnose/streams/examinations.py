@@ -5,6 +5,7 @@ A new examination is one function here and one line in STREAM_EXAMINATIONS.
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.special import ndtri
@@ -18,8 +19,10 @@ from calibrate.diagnose.streams.deflection import Deflection
 from calibrate.diagnose.streams.following import Following
 from calibrate.diagnose.streams.recorded import StreamDevice
 from calibrate.diagnose.streams.settling import Stand, Window
-from calibrate.diagnose.streams.stream_findings import StreamFinding
 from calibrate.diagnose.streams.track import Outcome, white_noise
+
+if TYPE_CHECKING:
+    from calibrate.diagnose.streams.stream_findings import StreamFinding
 
 Records = Iterator[ExaminationRecord]
 FEWEST_ROWS = 3
@@ -27,11 +30,11 @@ NO_JOINTS = "no angles of the joints were recorded"
 
 
 @dataclass(frozen=True, eq=False)
-class Seen:
+class StreamsSeen:
     """What the finders were given and what they found; empty where they could not begin."""
 
     devices: Mapping[str, StreamDevice]
-    findings: tuple[StreamFinding, ...]
+    findings: "tuple[StreamFinding, ...]"
     clocks: Mapping[str, ClockFit] = field(default_factory=dict[str, ClockFit])
     behind: Sequence[Following] = ()
     offsets: Mapping[str, tuple[AngleOffset, ...]] = field(default_factory=dict[str, tuple[AngleOffset, ...]])
@@ -39,6 +42,7 @@ class Seen:
     slips_judged: Sequence[bool] = ()
     stands: Sequence[Stand] = ()
     windows: Sequence[Window] | None = None
+    stated: frozenset[str] = frozenset()  # devices that the rig file states
 
     def sentences(self, *physics: str, stream: str = "", where: str = "") -> str:
         """What was found of these kinds, one sentence after the other; empty: nothing."""
@@ -54,8 +58,8 @@ class Seen:
         return f"{' and '.join(empty)} without one valid reading" if empty else ""
 
     def expects(self, *about: str) -> bool:
-        """Whether one of the devices that an examination is about was recorded."""
-        return any(name in self.devices for name in about)
+        """Whether one of the devices that an examination is about was recorded, or is one of the rig's."""
+        return any(name in self.devices or name in self.stated for name in about)
 
 
 NAMES = {
@@ -111,7 +115,7 @@ PAIRS = Examination(
 )
 
 
-def _continuity(seen: Seen) -> Records:
+def _continuity(seen: StreamsSeen) -> Records:
     if not seen.devices:
         yield CONTINUITY.not_examined("no stream was recorded", expected=False)
     for name, device in seen.devices.items():
@@ -127,7 +131,7 @@ def _continuity(seen: Seen) -> Records:
             yield CONTINUITY.nothing(1.0, "missing row", name)
 
 
-def _following(seen: Seen) -> Records:
+def _following(seen: StreamsSeen) -> Records:
     why = seen.missing("command", "joints")
     if why or not seen.behind:
         yield FOLLOWING.not_examined(why or NO_JOINTS, expected=seen.expects("command"))
@@ -143,7 +147,7 @@ def _following(seen: Seen) -> Records:
             yield FOLLOWING.nothing(max(sigmas * one.behind_sigma_s, limits.BEHIND_S), "s", where)
 
 
-def _offset(seen: Seen) -> Records:
+def _offset(seen: StreamsSeen) -> Records:
     why = seen.missing("command", "joints")
     if why:
         yield OFFSET.not_examined(why, expected=seen.expects("command"))
@@ -151,7 +155,7 @@ def _offset(seen: Seen) -> Records:
     yield from _of_offsets(OFFSET, "joints", seen)
 
 
-def _of_offsets(examination: Examination, stream: str, seen: Seen) -> Records:
+def _of_offsets(examination: Examination, stream: str, seen: StreamsSeen) -> Records:
     for one in seen.offsets.get(stream, ()):
         where = f"joint{one.joint}"
         found = seen.sentences("angle-offset", "droop", "encoder-eccentricity", stream=stream, where=f"{where}.angle")
@@ -163,13 +167,13 @@ def _of_offsets(examination: Examination, stream: str, seen: Seen) -> Records:
             yield examination.nothing(one.limit_rad, "rad", where)
 
 
-def _clock(seen: Seen) -> Records:
+def _clock(seen: StreamsSeen) -> Records:
     why, clock = seen.missing("encoders", "joints"), seen.clocks.get("encoders")
     yield _of_clock(CLOCK, "encoders", why, clock, seen, expected=seen.expects("encoders"))
 
 
 def _of_clock(
-    examination: Examination, name: str, why: str, clock: ClockFit | None, seen: Seen, *, expected: bool
+    examination: Examination, name: str, why: str, clock: ClockFit | None, seen: StreamsSeen, *, expected: bool
 ) -> ExaminationRecord:
     found = seen.sentences("latency", stream=name)
     if found:
@@ -181,7 +185,7 @@ def _of_clock(
     return examination.nothing(max(limits.LATE_SIGMAS * clock.offset_sigma_s, limits.LATE_S), "s")
 
 
-def _second(seen: Seen) -> Records:
+def _second(seen: StreamsSeen) -> Records:
     why, offsets = seen.missing("encoders", "joints"), seen.offsets.get("encoders", ())
     if why or not offsets:
         clock = seen.clocks.get("encoders")
@@ -200,7 +204,7 @@ def _second(seen: Seen) -> Records:
         )
 
 
-def _slips(seen: Seen) -> Records:
+def _slips(seen: StreamsSeen) -> Records:
     why, judged = seen.missing("encoders", "joints"), seen.slips_judged
     if why or not judged:
         clock = seen.clocks.get("encoders")
@@ -224,7 +228,7 @@ def _slips(seen: Seen) -> Records:
             yield SLIPS.not_examined("too few stands, and its offset is not determined", f"joint{joint}")
 
 
-def _compliance(seen: Seen) -> Records:
+def _compliance(seen: StreamsSeen) -> Records:
     why = seen.missing("encoders", "joints", "torque")
     if why or not seen.bent:
         both = seen.expects("encoders") and seen.expects("torque")
@@ -241,7 +245,7 @@ def _compliance(seen: Seen) -> Records:
             yield COMPLIANCE.nothing(sigmas * one.sigma, "rad/Nm", where)
 
 
-def _ringing(seen: Seen) -> Records:
+def _ringing(seen: StreamsSeen) -> Records:
     why = seen.missing("joints")
     found = seen.sentences("ringing")
     if found:
@@ -258,14 +262,14 @@ def _ringing(seen: Seen) -> Records:
             yield RINGING.nothing(max(noise, limits.FINEST_RAD), "rad")
 
 
-def _clock_of_spots(seen: Seen) -> Records:
+def _clock_of_spots(seen: StreamsSeen) -> Records:
     why, clock = seen.missing("spots", "joints"), seen.clocks.get("spots")
     if not why and clock is None:
         why = "no fitted model predicts them during the motion"
     yield _of_clock(SPOTS, "spots", why, clock, seen, expected=seen.expects("spots"))
 
 
-def _settled(seen: Seen) -> Records:
+def _settled(seen: StreamsSeen) -> Records:
     why = seen.missing("spots")
     found = seen.sentences("not-settled")
     if found:
@@ -281,7 +285,7 @@ def _settled(seen: Seen) -> Records:
             yield SETTLED.not_examined("no stretch of valid readings")
 
 
-STREAM_EXAMINATIONS: tuple[tuple[Examination, Callable[[Seen], Records]], ...] = (
+STREAM_EXAMINATIONS: tuple[tuple[Examination, Callable[[StreamsSeen], Records]], ...] = (
     (CONTINUITY, _continuity),
     (FOLLOWING, _following),
     (OFFSET, _offset),
@@ -295,7 +299,7 @@ STREAM_EXAMINATIONS: tuple[tuple[Examination, Callable[[Seen], Records]], ...] =
 )
 
 
-def stream_examinations(seen: Seen, *, arm: bool = True) -> tuple[ExaminationRecord, ...]:
+def stream_examinations(seen: StreamsSeen, *, arm: bool = True) -> tuple[ExaminationRecord, ...]:
     """The endings of all of them, in the order of the tuple; without an arm nothing is about its joints."""
     if not arm:
         return (*_continuity(seen), PAIRS.not_examined("it is a part of the check of a log", expected=False))

@@ -14,7 +14,7 @@ from calibrate.diagnose.streams.clock_faults import judged, lateness, shares_hos
 from calibrate.diagnose.streams.coarse_clock import Ticks
 from calibrate.diagnose.streams.continuity import Fault, breaks
 from calibrate.diagnose.streams.deflection import Deflection, deflections
-from calibrate.diagnose.streams.examinations import Seen, stream_examinations
+from calibrate.diagnose.streams.examinations import StreamsSeen, stream_examinations
 from calibrate.diagnose.streams.following import Following, following
 from calibrate.diagnose.streams.recorded import StreamDevice, by_host, start_between
 from calibrate.diagnose.streams.ringing import Levers, ringing
@@ -67,17 +67,21 @@ def examine(
     zeros_rad: Sequence[float | None] = (),
     *,
     arm: bool = True,
+    stated: frozenset[str] = frozenset(),
 ) -> StreamReport:
     """Streams as `devices_of` gives them. `predicted`: a model's word on the spots; without it their clock is open.
 
     `windows`: when the samples were taken, on the clock of the spots, one a sample. `causes`: what physics may do
     between the two encoders of a joint. `levers`: torque of gravity about each joint. `zeros_rad`: what the second
     encoder of each joint shows at the joint's zero, where that is stated. `arm`: False of a log of encoders alone.
+    `stated`: devices of the rig, recorded or not.
     """
     found, devices = _mended(devices)
     joints, command = devices.get("joints"), devices.get("command")
     if joints is None:
-        return StreamReport(tuple(found), {}, (), (), stream_examinations(Seen(devices, tuple(found)), arm=arm))
+        return StreamReport(
+            tuple(found), {}, (), (), stream_examinations(StreamsSeen(devices, tuple(found), stated=stated), arm=arm)
+        )
     stands = stands_of((command or joints).track)
     clocks: dict[str, ClockFit] = {}
     behind: tuple[Following, ...] = ()
@@ -103,7 +107,7 @@ def examine(
             found.append(late_finding(name, late, joints.track.channels))
     found += _rings(joints.track, stands)
     bent, judged_slips = ((), ()) if second is None else (second.bent, second.judged)
-    seen_all = Seen(devices, tuple(found), clocks, behind, offsets, bent, judged_slips, stands, windows)
+    seen_all = StreamsSeen(devices, tuple(found), clocks, behind, offsets, bent, judged_slips, stands, windows, stated)
     return StreamReport(tuple(found), clocks, behind, stands, stream_examinations(seen_all), offsets)
 
 

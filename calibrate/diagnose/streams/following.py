@@ -46,8 +46,11 @@ def following(command: Track, reading: Track) -> tuple[Following, ...]:
     at, v, a = course_of(command, reading.time_s)
     good = np.all(np.isfinite(at) & np.isfinite(v) & np.isfinite(a), axis=1)
     block = np.floor((reading.time_s - reading.time_s[:1].sum()) / limits.BLOCK_S).astype(np.intp)
+    still = np.ptp(reading.values[good], axis=0) == 0.0 if np.any(good) else np.zeros(reading.channels, dtype=bool)
     return tuple(
-        _joint(reading.joint(j), (at - reading.values)[good, j], v[good, j], a[good, j], block[good])
+        Following(reading.joint(j), Outcome.NOT_DETERMINABLE, why="the reading never changes")
+        if still[j]
+        else _joint(reading.joint(j), (at - reading.values)[good, j], v[good, j], a[good, j], block[good])
         for j in range(reading.channels)
     )
 

@@ -83,5 +83,6 @@ OFFSET_BEYOND_LEFT = 5.0
 OFFSET_BEYOND_MOTION = 2.0
 OFFSET_LEAVES = 0.5  # share of what is left without it, rms, that may be left with a step or a droop
 FINEST_RAD = 1e-6  # rad; a fifth of an arc second: no encoder of a joint shows less
+UNLIKE = 0.05  # share of the motion; what differs by more does not follow the same shaft one to one
 OFFSET_TURN_RAD = 1.0  # rad; over a shorter way a sine of the angle is not separated from a level
 STANDS_RAD = 1e-3  # rad; a joint that turns through less has not moved

@@ -116,7 +116,8 @@ def _spots(recording: Recording) -> StreamDevice | None:
     total = current.sum(axis=3)
     with np.errstate(invalid="ignore", divide="ignore"):
         spot = fixture.half_size_m * (current[..., 1] - current[..., 0]) / total
-    usual = np.nanpercentile(total, 90.0, axis=0)
+    lit = np.isfinite(total).any()
+    usual = np.nanpercentile(total, 90.0, axis=0) if lit else np.full(total.shape[1:], np.nan)
     dark = np.any(~(total > limits.DARK * usual), axis=(1, 2))
     values = np.where(dark[:, None], np.nan, spot.reshape(-1, 4))
     return StreamDevice(Track("spots", "m", stream.device_s, values), stream.sequence, stream.host_s)

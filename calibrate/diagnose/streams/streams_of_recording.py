@@ -110,7 +110,13 @@ def streams_of(recording: Recording, fitted: Fitted | None) -> StreamReport | No
     zeros_rad = [joint.encoder_zero_rad for joint in rig.arm.joints] if rig.n_joints else []
     causes = None if fitted is None else causes_of(fitted)
     arm = rig.n_joints > 0
-    return examine(devices, predicted, windows, causes, gravity_levers(rig), zeros_rad, arm=arm)
+    return examine(devices, predicted, windows, causes, gravity_levers(rig), zeros_rad, arm=arm, stated=_stated(rig))
+
+
+def _stated(rig: Rig) -> frozenset[str]:
+    """Devices of a session that the rig file states."""
+    named = {"spots": rig.devices.psd, "encoders": rig.devices.encoders, "command": rig.devices.robot}
+    return frozenset(name for name, device in named.items() if device is not None)
 
 
 def gravity_levers(rig: Rig) -> GravityLevers | None:

@@ -3,7 +3,8 @@
 import re
 from collections.abc import Iterator, Sequence
 
-from acquisition.recording.examination import all_examined, examined_names, not_examined
+from acquisition.recording.checked import READINGS
+from acquisition.recording.examination import FOUND, all_examined, examined_names, not_examined
 from calibrate.diagnose.assess import Statement
 from calibrate.diagnose.record.pose_examinations import PHYSICS
 from calibrate.diagnose.record.schema import (
@@ -71,14 +72,17 @@ def _streams_verdict(file: DiagnosisFile) -> str:
     poses = "; no settled poses were recorded" if any(one.what == PHYSICS.what for one in file.examinations) else ""
     if file.findings:
         return f"Streams only: {counted(len(file.findings), 'cause')} found{poses}."
-    unexplained = file.unexplained is not None
+    left_out = any(one.what == READINGS.what and one.outcome == FOUND for one in file.examinations)
+    unexplained = file.unexplained is not None or left_out
     if all_examined(file.examinations) and not file.incomplete and not unexplained:
         return f"Streams only: no fault found{poses}."
     examined = ", ".join(examined_names(file.examinations))
     if not examined:
         return "Streams only: nothing was examined; the reasons are below."
-    left = "something unexplained is left" if unexplained else "nothing found"
-    return f"Streams only: {left} in what was examined ({examined}){poses}; not examined: {_left_out(file)}."
+    left = "no cause found" if left_out else "something unexplained is left" if unexplained else "nothing found"
+    more = "; readings of the encoders were left out" if left_out else ""
+    more += f"; not examined: {_left_out(file)}" if _left_out(file) else ""
+    return f"Streams only: {left} in what was examined ({examined}){poses}{more}."
 
 
 def _left_out(file: DiagnosisFile) -> str:
