@@ -17,7 +17,9 @@ from acquisition.recording import Recording, RecordingError, SamplesError, read
 from acquisition.recording.can_log import SUFFIXES as CAN_SUFFIXES
 from acquisition.recording.can_log import CanImport, import_can
 from acquisition.recording.check_recording import left_out
+from acquisition.recording.examination import FOUND, not_examined_lines
 from acquisition.recording.foreign import (
+    CONTENT,
     KINDS,
     ColumnsFile,
     Sheet,
@@ -283,9 +285,11 @@ def _logs(
     recording, started_utc = recording_of(tables, out, stamps)
     if restore_stamps:
         recording = restored_stamps(replace(recording, path=tables[0].sheet.path))
-    about = [columns_file(table, None, SOFTWARE) for table in tables]
+    others = [(*tables[:at], *tables[at + 1 :]) for at in range(len(tables))]
+    about = [columns_file(table, None, SOFTWARE, rest) for table, rest in zip(tables, others, strict=True)]
     for one in about:
         print_columns(console, one)
+    _print_examined(console, about)
     _agreed(yes=yes)
     names = ", ".join(str(table.sheet.path.name) for table in tables)
     with taken_back(out):
@@ -317,6 +321,7 @@ def _table(table: Understanding, out: Path, *, yes: bool) -> None:
     samples = samples_of(table)
     about = columns_file(table, samples, SOFTWARE)
     print_columns(console, about)
+    _print_examined(console, (about,))
     _agreed(yes=yes)
     with taken_back(out):
         columns_path = write_session(table, samples, about, out)
@@ -355,8 +360,24 @@ def print_columns(console: Console, about: ColumnsFile) -> None:
 
 def _remarks(about: ColumnsFile) -> Iterator[str]:
     yield from about.notes
-    if about.unused:
-        yield f"not used: {', '.join(about.unused)} (keep one with --columns \"'{about.unused[0]}' = its_name\")"
+    columns = [one for one in about.not_taken if one.kind == "column"]
+    if columns:
+        numbers = next((one.name for one in columns if one.type == "numbers" and one.name in about.unused), None)
+        remedy = f" (keep one with --columns \"'{numbers}' = its_name\")" if numbers else ""
+        yield f"not used: {'; '.join(one.says.removeprefix('column ') for one in columns)}{remedy}"
+    others = [one.says for one in about.not_taken if one.kind != "column"]
+    if others:
+        yield f"not taken: {'; '.join(others)}"
+
+
+def _print_examined(console: Console, about: Sequence[ColumnsFile]) -> None:
+    """What examinations have found beside what was not taken, and which did not take place."""
+    records = [record for one in about for record in one.examinations]
+    found = [one for one in records if one.outcome == FOUND and one.what != CONTENT.what]
+    for line in (*(f"{one.what}{f' ({one.where})' if one.where else ''}: {one.says}" for one in found),):
+        console.print(line, markup=False, highlight=False)
+    for line in not_examined_lines(records):
+        console.print(line, markup=False, highlight=False)
 
 
 def _range(si_unit: str, lowest: float | None, highest: float | None) -> str:

@@ -47,6 +47,9 @@ SINGLE: Mapping[str, tuple[str, str]] = MappingProxyType(
     }
 )
 TEXT = ("bar_end",)
+READ = ("wire", *(f"psd{k}_{axis}" for k in (1, 2) for axis in "xy"))  # by an instrument
+TOUCHED = ("seat", "plane", "bar", "sphere")
+COMPARED = ("cmd", "enc", "tau", "motor_tau")  # with what the joints report
 TEMPERATURE = re.compile(r"temp_([A-Za-z0-9_]+)")
 OWN_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 
@@ -95,6 +98,17 @@ class Group:
         return "" if self.meaning == UNUSED else suffix_of(self.meaning) or ""
 
     @property
+    def measures(self) -> bool:
+        """Whether it is what an instrument reads, or which seat, plane, bar or sphere is touched; or a command."""
+        bare = bare_meaning(self.meaning)
+        return bare in (*CONVENTIONS, "position", POSE_MATRIX) or self.meaning in (*READ, *TOUCHED, *COMPARED)
+
+    @property
+    def is_temperature(self) -> bool:
+        """Whether it is a temperature, of whatever part."""
+        return TEMPERATURE.fullmatch(self.meaning) is not None
+
+    @property
     def kept(self) -> bool:
         """Whether it is a column of the user's own, kept as it stands."""
         bare = bare_meaning(self.meaning)
@@ -132,12 +146,22 @@ PER_JOINT: Mapping[str, tuple[str, str]] = MappingProxyType(
         "last_move": ("last_move", "_rad"),
     }
 )
+# Universal Robots' own names, which their driver does not send in this order: ur_description, urdf/ur_macro.xacro
+UR_JOINTS = (
+    "shoulder_pan_joint",
+    "shoulder_lift_joint",
+    "elbow_joint",
+    "wrist_1_joint",
+    "wrist_2_joint",
+    "wrist_3_joint",
+)
 OF_SOME_JOINTS = ("enc", "tau", "motor_tau")  # not every joint need have a second encoder, or a torque
 # folded headings of one column a joint, the number cut off
 STEMS: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {
         "q": (
-            *("q", "j", "a", "joint", "jt", "axis", "achse", "axe", "theta", "θ", "actualq", "jointpos", "jointangle"),
+            *("q", "j", "a", "joint", "jt", "axis", "achse", "axe", "theta", "θ", "actualq"),
+            *("jointpos", "jointangle", "jointposition", "jointpositions", "jointangles"),
             *("rax", "robax", "e6axisa", "axisa", "$axisacta", "axisacta"),
         ),
         "cmd": ("cmd", "command", "qcmd", "targetq", "qtarget", "soll", "cmdq"),

@@ -7,7 +7,7 @@ range.
 """
 
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 from acquisition.recording.errors import SamplesError, shown
@@ -180,6 +180,15 @@ def _check_count(group: Group, n_joints: int) -> None:
         raise SamplesError(
             f"--columns: {group.meaning} takes {count} columns, {len(group.columns)} are given; correct the list"
         )
+
+
+def statement(names: Sequence[str], meaning: str) -> str:
+    """The option that gives columns of these headings a meaning, as it is typed."""
+    first, last = (_NUMBER_AT_END.fullmatch(name) for name in (names[0], names[-1]))
+    listed = " ".join(f"'{name}'" if any(c in name for c in " ,=[].:") else name for name in names)
+    if first and last and first[1] == last[1] and int(last[2]) - int(first[2]) + 1 == len(names) and "'" not in listed:
+        listed = f"{names[0]}..{names[-1]}"
+    return f'--columns "{shown(listed, 200)} = {meaning}"'
 
 
 def _found(sheet: Sheet, left: str) -> Iterator[int]:

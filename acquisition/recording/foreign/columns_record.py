@@ -8,12 +8,14 @@ import msgspec
 import numpy as np
 
 from acquisition.recording.errors import RecordingError, shown
+from acquisition.recording.examination import ExaminationRecord
 from acquisition.recording.files import write_json
 from acquisition.recording.files.explain import suffix_of
 from acquisition.recording.foreign.column_meanings import TEXT, TIME, UNUSED, Group
 from acquisition.recording.foreign.conversion import Understanding, base_of, converted, times_of
 from acquisition.recording.foreign.heading_units import si_symbol
-from acquisition.recording.foreign.sheet import Sheet
+from acquisition.recording.foreign.import_examinations import Imported, import_examinations, left_out
+from acquisition.recording.foreign.sheet import NotTaken, Sheet
 from acquisition.recording.recording import Recording
 from acquisition.recording.samples import Samples
 from acquisition.recording.session_folder import export
@@ -45,10 +47,17 @@ class ColumnsFile(msgspec.Struct, frozen=True):
     unused: tuple[str, ...]
     notes: tuple[str, ...]
     stated: str  # as `--columns` takes it: reads the table again in the same way
+    not_taken: tuple[NotTaken, ...] = ()  # columns, and topics of a bag with its first table
+    examinations: tuple[ExaminationRecord, ...] = ()
 
 
-def columns_file(table: Understanding, samples: Samples | None, software: str) -> ColumnsFile:
-    """What was understood, as it is printed and written; without `samples` it is a log, converted here."""
+def columns_file(
+    table: Understanding, samples: Samples | None, software: str, others: Sequence[Understanding] = ()
+) -> ColumnsFile:
+    """What was understood, as it is printed and written; without `samples` it is a log, converted here.
+
+    `others`: the tables before and behind it, of which the same import makes one recording.
+    """
     sheet = table.sheet
     used = [group for group in table.groups if group.meaning != UNUSED]
     return ColumnsFile(
@@ -63,6 +72,8 @@ def columns_file(table: Understanding, samples: Samples | None, software: str) -
         table.unused(),
         tuple(_notes(table)),
         ", ".join(_clause(table, group) for group in used),
+        left_out(table),
+        import_examinations(Imported(table, tuple(others), is_log=samples is None)),
     )
 
 
@@ -114,6 +125,7 @@ def _record(table: Understanding, group: Group, samples: Samples | None) -> Colu
 def _notes(table: Understanding) -> Iterator[str]:
     sheet = table.sheet
     time_group = next((group for group in table.groups if group.meaning == TIME), None)
+    yield from sheet.notes
     if sheet.title:
         yield f"above the headings, not read: {shown('; '.join(sheet.title), 80)}"
     for number, file in enumerate(dict.fromkeys(sheet.files), start=1):

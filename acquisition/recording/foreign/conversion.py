@@ -194,9 +194,9 @@ def samples_of(table: Understanding) -> Samples:
             f"{sheet.place()}: no columns are understood as the {n_joints} joint angles ({sheet.titles}); state which "
             f'they are: --columns "A1..A{n_joints} [deg] = q", or the row of the headings: --header-row'
         )
-    if len(columns) == n_joints + 1:
+    if not any(group.measures or (group.kept and group.meaning != UNUSED) for group in table.groups):
         raise SamplesError(
-            f"{sheet.place()}: no column is understood as a measurement; state which it is: "
+            f"{sheet.place()}: no column is understood as a measurement ({sheet.titles}); state which it is: "
             '--columns "X Y Z [mm] = position"'
         )
     ordered = {name: columns[name] for name in ("t_s", *per_joint("q", "_rad", n_joints))} | columns
@@ -286,6 +286,8 @@ def _fault(table: Understanding, group: Group, unit: Unit, *, settled: bool) -> 
     if group.meaning.endswith(POSE_MATRIX):
         values = values[:, 3::4][:, :3]
     values = values * unit.factor + unit.offset
+    if np.isnan(values).all():
+        return None  # no reading speaks against the unit
     largest = float(np.nanmax(np.abs(values), initial=0.0))
     spread = float(np.max(_spreads(values), initial=0.0))
     si = {"rad": "rad", "m": "m", "degC": "°C", "v": "V", "kg": "kg", "rad_s": "rad/s"}.get(group.suffix, group.suffix)

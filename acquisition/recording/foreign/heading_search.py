@@ -3,7 +3,8 @@
 Nothing is taken twice, and nothing is guessed among several columns that might be meant.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from acquisition.recording.errors import SamplesError, shown
@@ -22,12 +23,13 @@ from acquisition.recording.foreign.column_meanings import (
     TIME,
     TIMES,
     UNUSED,
+    UR_JOINTS,
     Group,
     bare_meaning,
     common_unit,
     name_of,
 )
-from acquisition.recording.foreign.column_statements import stated_groups
+from acquisition.recording.foreign.column_statements import stated_groups, statement
 from acquisition.recording.foreign.heading_units import folded
 from acquisition.recording.foreign.sheet import Sheet
 
@@ -43,6 +45,9 @@ def understood(sheet: Sheet, n_joints: int, columns: str = "", *, with_arm: bool
     if wrong := next((g for g in stated if g.meaning in PER_JOINT and g.meaning not in per_joint_meanings), None):
         raise SamplesError(f"--columns: {wrong.meaning} needs an arm, and the rig file has none; state enc")
     return (*stated, *_Headings(sheet, n_joints, stated).groups(per_joint_meanings))
+
+
+_NUMBER = re.compile(r"\d+")
 
 
 class _Headings:
@@ -85,6 +90,8 @@ class _Headings:
         if whole:
             ((stem, columns),) = whole.items()
             yield self._taken(meaning, columns, stem)
+        elif meaning == "q" and (columns := self._named_joints()):
+            yield self._taken(meaning, columns)
         elif meaning == "q" and (most := max(found.values(), key=len)):
             raise SamplesError(
                 f"{self._sheet.place()}: {len(most)} joint angles ({self._names(most)}) for an arm of {self._n} "
@@ -108,6 +115,17 @@ class _Headings:
         while (columns := self._free.get(f"{stem}{first + len(out)}")) is not None:
             out.append(self._only(columns))
         return tuple(out)
+
+    def _named_joints(self) -> tuple[int, ...]:
+        """The joints of one arm among named joints, in order; empty: none. SamplesError for joints of several arms."""
+        free = {column for columns in self._free.values() for column in columns}
+        names = {c: name_of(self._sheet, c) for c in self._sheet.joint_columns if c in free}
+        arms = list(dict.fromkeys((*_arms_of_numbers(names, self._n), *_arms_of_makers(names, self._n))))
+        if len(arms) > 1:
+            several = " or ".join(f"{names[c[0]]} … {names[c[-1]]}" for c in arms)
+            stated = statement([names[column] for column in arms[0]], "q")
+            raise SamplesError(f"{self._sheet.place()}: q may be {several}; state which: {stated}")
+        return arms[0] if arms else ()
 
     def _sets(self) -> Iterator[Group]:
         for meaning, ways in SETS.items():
@@ -161,3 +179,23 @@ class _Headings:
 
     def _remedy(self, meaning: str) -> str:
         return f'state which: --columns "… = {meaning}"'
+
+
+def _arms_of_numbers(names: Mapping[int, str], n_joints: int) -> Iterator[tuple[int, ...]]:
+    """Columns whose names differ in one number alone, where these are 1 to n, or 0 to n - 1."""
+    alike: dict[tuple[str, str], dict[int, int]] = {}
+    for column, name in names.items():
+        for match in _NUMBER.finditer(name):
+            alike.setdefault((name[: match.start()], name[match.end() :]), {})[int(match[0])] = column
+    for numbered in alike.values():
+        if sorted(numbered) in (list(range(1, n_joints + 1)), list(range(n_joints))):
+            yield tuple(numbered[number] for number in sorted(numbered))
+
+
+def _arms_of_makers(names: Mapping[int, str], n_joints: int) -> Iterator[tuple[int, ...]]:
+    """Columns of UR_JOINTS with one prefix."""
+    columns = {name: column for column, name in names.items()}
+    last = UR_JOINTS[-1]
+    for prefix in (name.removesuffix(last) for name in columns if name.endswith(last)):
+        if n_joints == len(UR_JOINTS) and all(prefix + name in columns for name in UR_JOINTS):
+            yield tuple(columns[prefix + name] for name in UR_JOINTS)

@@ -31,9 +31,10 @@ from acquisition.recording.foreign.conversion import (
     times_of,
     understand,
 )
-from acquisition.recording.foreign.heading_units import si_symbol, unit_of
+from acquisition.recording.foreign.heading_units import folded, si_symbol, unit_of
 from acquisition.recording.foreign.ros_topics import ROS_1, read_bag
-from acquisition.recording.foreign.sheet import SUFFIXES, Sheet, read_sheet
+from acquisition.recording.foreign.sheet import Sheet
+from acquisition.recording.foreign.sheet_files import SUFFIXES, read_sheet
 from acquisition.recording.foreign.sheet_times import check_times
 from acquisition.recording.mcap.layout import STREAMS_NOTE
 from acquisition.recording.recording import Channel, Recording, Stamps, Stream, check_declaration
@@ -71,7 +72,8 @@ def read_log(path: Path, sheet: str | None = None, header_row: int | None = None
 def understand_logs(sheets: Sequence[Sheet], rig_text: str, rig_name: str, columns: str) -> tuple[Understanding, ...]:
     """What each table means. A clause of `columns` holds for the tables that have its headings.
 
-    SamplesError for a clause of no table, a table without a time, and two tables of one meaning.
+    SamplesError for a clause of no table, a table without a time, two tables of one meaning, and where no table has a
+    column that is understood as more than a time.
     """
     names = [stream_name(sheet) for sheet in sheets]
     if twice := next((name for name in names if names.count(name) > 1), None):
@@ -82,8 +84,8 @@ def understand_logs(sheets: Sequence[Sheet], rig_text: str, rig_name: str, colum
     for sheet in sheets:
         own = {k: clause.text for k, clause in enumerate(stated) if clause.is_of(sheet, stream_name(sheet))}
         used |= set(own)
-        table = understand(sheet, rig_text, rig_name, ", ".join(own.values()), whole_rows=False)
-        tables.append(_with_own_channels(table))
+        tables.append(understand(sheet, rig_text, rig_name, ", ".join(own.values()), whole_rows=False))
+    known = any(_is_known(group) for table in tables for group in table.groups)
     if lost := next((clause for k, clause in enumerate(stated) if k not in used), None):
         raise SamplesError(f"--columns: no log has the headings of '{shown(lost.text, 60)}'; correct them")
     for meaning in _JOINT_CHANNELS:
@@ -94,7 +96,28 @@ def understand_logs(sheets: Sequence[Sheet], rig_text: str, rig_name: str, colum
                 f"'{shown(first, 40)}' and '{shown(second, 40)}' both hold joint angles understood as {meaning}; state "
                 f'what one of them is: --columns "{shown(second, 40)}: A1..A6 [deg] = enc"'
             )
+    tables = [_with_own_channels(table) for table in tables]
+    if not known:
+        _refuse_unknown(tables)
     return tuple(tables)
+
+
+def _refuse_unknown(tables: Sequence[Understanding]) -> None:
+    """SamplesError naming what the files hold, of which nothing is understood."""
+    headings = [h for table in tables for c, h in enumerate(table.sheet.headings) if h and not _is_time(table, c)]
+    topics = [one.says for table in tables for one in table.sheet.not_taken]
+    rows = sum(len(table.sheet.rows) for table in tables)
+    arm = tables[0].rig.n_joints
+    example = f"A1..A{arm} [deg] = q" if arm else f"E1..E{tables[0].rig.n_encoders} [deg] = enc"
+    raise SamplesError(
+        f"{tables[0].sheet.place()}: no joint angles, commands, encoders or measurement are understood; in {rows} rows "
+        f'there are {shown(", ".join((*headings, *topics)), 110)}; state what they are: --columns "{example}"'
+    )
+
+
+def _is_time(table: Understanding, column: int) -> bool:
+    of_time = any(group.meaning == TIME and column in group.columns for group in table.groups)
+    return of_time or folded(name_of(table.sheet, column)) in ("device", "devices")
 
 
 def stream_name(sheet: Sheet) -> str:
@@ -126,6 +149,15 @@ def recording_of(
         notes={STREAMS_NOTE: ", ".join(stream.name for stream in streams)},
     )
     return recording, start.started_utc
+
+
+def _is_known(group: Group) -> bool:
+    """Whether a diagnosis can use it, or a person has named it."""
+    return group.measures or group.meaning in _JOINT_CHANNELS or group.is_temperature or _is_named(group)
+
+
+def _is_named(group: Group) -> bool:
+    return group.kept and group.meaning not in (UNUSED, DEVICE_S)
 
 
 def _with_own_channels(table: Understanding) -> Understanding:
