@@ -17,9 +17,7 @@ from acquisition.recording import Recording, RecordingError, SamplesError, read
 from acquisition.recording.can_log import SUFFIXES as CAN_SUFFIXES
 from acquisition.recording.can_log import CanImport, import_can
 from acquisition.recording.check_recording import left_out
-from acquisition.recording.examination import FOUND, not_examined_lines
 from acquisition.recording.foreign import (
-    CONTENT,
     KINDS,
     ColumnsFile,
     Sheet,
@@ -289,7 +287,8 @@ def _logs(
     about = [columns_file(table, None, SOFTWARE, rest) for table, rest in zip(tables, others, strict=True)]
     for one in about:
         print_columns(console, one)
-    _print_examined(console, about)
+    for line in (line for one in about for line in one.examination_lines()):
+        console.print(line, markup=False, highlight=False)
     _agreed(yes=yes)
     names = ", ".join(str(table.sheet.path.name) for table in tables)
     with taken_back(out):
@@ -321,7 +320,8 @@ def _table(table: Understanding, out: Path, *, yes: bool) -> None:
     samples = samples_of(table)
     about = columns_file(table, samples, SOFTWARE)
     print_columns(console, about)
-    _print_examined(console, (about,))
+    for line in about.examination_lines():
+        console.print(line, markup=False, highlight=False)
     _agreed(yes=yes)
     with taken_back(out):
         columns_path = write_session(table, samples, about, out)
@@ -354,29 +354,7 @@ def print_columns(console: Console, about: ColumnsFile) -> None:
         cells = _several(record.headings), record.meaning, record.unit or "—", _several(record.becomes), span
         lines.add_row(*map(Text, cells))  # no markup: a heading may hold [deg]
     console.print(lines)
-    for line in _remarks(about):
-        console.print(line, markup=False, highlight=False)
-
-
-def _remarks(about: ColumnsFile) -> Iterator[str]:
-    yield from about.notes
-    columns = [one for one in about.not_taken if one.kind == "column"]
-    if columns:
-        numbers = next((one.name for one in columns if one.type == "numbers" and one.name in about.unused), None)
-        remedy = f" (keep one with --columns \"'{numbers}' = its_name\")" if numbers else ""
-        yield f"not used: {'; '.join(one.says.removeprefix('column ') for one in columns)}{remedy}"
-    others = [one.says for one in about.not_taken if one.kind != "column"]
-    if others:
-        yield f"not taken: {'; '.join(others)}"
-
-
-def _print_examined(console: Console, about: Sequence[ColumnsFile]) -> None:
-    """What examinations have found beside what was not taken, and which did not take place."""
-    records = [record for one in about for record in one.examinations]
-    found = [one for one in records if one.outcome == FOUND and one.what != CONTENT.what]
-    for line in (*(f"{one.what}{f' ({one.where})' if one.where else ''}: {one.says}" for one in found),):
-        console.print(line, markup=False, highlight=False)
-    for line in not_examined_lines(records):
+    for line in (*about.notes, *about.not_taken_lines()):
         console.print(line, markup=False, highlight=False)
 
 

@@ -10,7 +10,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from acquisition.recording.examination import FOUND, NOT_EXAMINED, NOTHING
-from acquisition.recording.foreign import IMPORT_EXAMINATIONS
+from acquisition.recording.foreign.import_examinations import IMPORT_EXAMINATIONS
 from calibeam.cli import run
 
 RIG = Path(__file__).parents[2] / "docs" / "examples" / "lab" / "rig.toml"
@@ -130,7 +130,7 @@ def test_a_whole_table_is_examined_in_everything(kind: str, tmp_path: Path, caps
     [
         ({"x [m]": [np.nan, *WHOLE["x [m]"][1:]]}, "log", "measurements", "1 of 24 readings are missing"),
         ({"q2 [rad]": [np.nan, *WHOLE["q2 [rad]"][1:]]}, "log", "joint angles", "1 of 48 angles are missing"),
-        ({"time [s]": [0.0, 2.0, 1.0, *range(3, 8)]}, "log", "times", "time goes back 1 times, first at row 3"),
+        ({"time [s]": [0.0, 2.0, 1.0, *range(3, 8)]}, "log", "times", "1 step back in time, first at row 3"),
         ({"time [s]": [0.0, 1.0, 1.0, *range(3, 8)]}, "log", "times", "1 row with the time of the row before"),
     ],
 )

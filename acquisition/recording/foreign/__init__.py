@@ -9,14 +9,11 @@ line in `heading_units`.
 
 from acquisition.recording.foreign.columns_record import ColumnsFile, columns_file, write_columns, write_session
 from acquisition.recording.foreign.conversion import Understanding, questions, samples_of, understand
-from acquisition.recording.foreign.import_examinations import CONTENT, IMPORT_EXAMINATIONS
 from acquisition.recording.foreign.logs import KINDS, read_log, recording_of, understand_logs
 from acquisition.recording.foreign.sheet import Sheet
 from acquisition.recording.foreign.sheet_files import read_seats, read_sheet
 
 __all__ = [
-    "CONTENT",
-    "IMPORT_EXAMINATIONS",
     "KINDS",
     "ColumnsFile",
     "Sheet",

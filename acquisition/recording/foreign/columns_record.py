@@ -8,13 +8,13 @@ import msgspec
 import numpy as np
 
 from acquisition.recording.errors import RecordingError, shown
-from acquisition.recording.examination import ExaminationRecord
+from acquisition.recording.examination import FOUND, ExaminationRecord, not_examined_lines
 from acquisition.recording.files import write_json
 from acquisition.recording.files.explain import suffix_of
 from acquisition.recording.foreign.column_meanings import TEXT, TIME, UNUSED, Group
 from acquisition.recording.foreign.conversion import Understanding, base_of, converted, times_of
 from acquisition.recording.foreign.heading_units import si_symbol
-from acquisition.recording.foreign.import_examinations import Imported, import_examinations, left_out
+from acquisition.recording.foreign.import_examinations import CONTENT, Imported, import_examinations, left_out
 from acquisition.recording.foreign.sheet import NotTaken, Sheet
 from acquisition.recording.recording import Recording
 from acquisition.recording.samples import Samples
@@ -49,6 +49,24 @@ class ColumnsFile(msgspec.Struct, frozen=True):
     stated: str  # as `--columns` takes it: reads the table again in the same way
     not_taken: tuple[NotTaken, ...] = ()  # columns, and topics of a bag with its first table
     examinations: tuple[ExaminationRecord, ...] = ()
+
+    def not_taken_lines(self) -> Iterator[str]:
+        """What nothing becomes of, for a person: columns, with the way to keep one; topics and their fields."""
+        columns = [one for one in self.not_taken if one.kind == "column"]
+        if columns:
+            numbers = next((one.name for one in columns if one.type == "numbers" and one.name in self.unused), None)
+            remedy = f" (keep one with --columns \"'{numbers}' = its_name\")" if numbers else ""
+            yield f"not used: {'; '.join(one.says.removeprefix('column ') for one in columns)}{remedy}"
+        others = [one.says for one in self.not_taken if one.kind != "column"]
+        if others:
+            yield f"not taken: {'; '.join(others)}"
+
+    def examination_lines(self) -> Iterator[str]:
+        """What the examinations have found beside what was not taken, and those that did not take place."""
+        for one in self.examinations:
+            if one.outcome == FOUND and one.what != CONTENT.what:
+                yield f"{one.what}{f' ({one.where})' if one.where else ''}: {one.says}"
+        yield from not_examined_lines(self.examinations)
 
 
 def columns_file(

@@ -155,7 +155,8 @@ def _times(imported: Imported) -> Records:
         yield TIMES.not_examined("all rows have one time", where)
     elif (back := np.flatnonzero(steps_s < 0.0)).size:
         line = table.sheet.lines[int(back[0]) + 1]
-        yield TIMES.found(f"time goes back {back.size} times, first at row {line}", where)
+        count = f"{back.size} step{'' if back.size == 1 else 's'}"
+        yield TIMES.found(f"{count} back in time, first at row {line}", where)
     elif (same := np.flatnonzero(steps_s == 0.0)).size:
         yield TIMES.found(f"{same.size} {_rows(same.size)} with the time of the row before", where)
     else:

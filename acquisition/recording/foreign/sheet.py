@@ -135,5 +135,5 @@ def is_number(cell: Raw) -> bool:
 
 
 def is_missing(cell: Raw) -> bool:
-    """Whether a cell says that there is no reading: a text such as n/a, or NaN."""
+    """Whether a cell is the mark of a missing reading: a text such as n/a, or NaN."""
     return (isinstance(cell, str) and cell.casefold() in NOT_THERE) or (isinstance(cell, float) and math.isnan(cell))
