@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from rosbags.rosbag1 import Writer as OldWriter
 from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
 from scipy.spatial.transform import Rotation
@@ -228,3 +229,49 @@ def test_a_bag_of_joints_without_an_order_alone_is_refused(tmp_path: Path, capsy
     assert not (tmp_path / "log.mcap").exists()
     stated = imported(bag, RIG, "--columns", "waist arm fore roll bend twist = q").streams["js"]
     np.testing.assert_allclose(stated.values["actual_q_rad"], ANGLES_RAD[:, :6])
+
+
+def test_transforms_and_points_of_a_bag_of_ros_1_are_taken(tmp_path: Path) -> None:
+    store = get_typestore(Stores.ROS1_NOETIC)
+    types = store.types
+    kinds = {"/vicon": "geometry_msgs/msg/TransformStamped", "/smr": "geometry_msgs/msg/PointStamped"}
+    with OldWriter(tmp_path / "robot.bag") as bag:
+        topics = {topic: bag.add_connection(topic, kind, typestore=store) for topic, kind in kinds.items()}
+        for row in range(ROWS):
+            now = types["builtin_interfaces/msg/Time"](1_700_000_000, 10_000_000 * row)
+            at = types["std_msgs/msg/Header"](row, now, "tracker")
+            turned = types["geometry_msgs/msg/Quaternion"](*TURNS[row].as_quat())
+            both = types["geometry_msgs/msg/Transform"](types["geometry_msgs/msg/Vector3"](*POINTS_M[row]), turned)
+            messages = {
+                "/vicon": types[kinds["/vicon"]](at, "flange", both),
+                "/smr": types[kinds["/smr"]](at, types["geometry_msgs/msg/Point"](*POINTS_M[row])),
+            }
+            for topic, message in messages.items():
+                data = store.serialize_ros1(message, kinds[topic])
+                bag.write(topics[topic], 1_700_000_000 * 10**9 + row * 10_000_000, data)
+    streams = imported(tmp_path / "robot.bag", RIG).streams
+    np.testing.assert_allclose(streams["vicon"].values["position_m"], POINTS_M)
+    np.testing.assert_allclose(streams["smr"].values["position_m"], POINTS_M)
+
+
+def test_an_arm_and_its_gripper_on_two_topics(tmp_path: Path) -> None:
+    fingers = [("/gripper/joint_states", joint_state(r, ("finger_1", "finger_2"), (0.01, 0.01))) for r in range(ROWS)]
+    arm = [
+        ("/joint_states", joint_state(r, [f"joint_{k}" for k in range(1, 7)], ANGLES_RAD[r, :6])) for r in range(ROWS)
+    ]
+    bag = write_bag(tmp_path / "bag", [*arm, *fingers])
+    streams = imported(bag, RIG).streams
+    np.testing.assert_allclose(streams["joint_states"].values["actual_q_rad"], ANGLES_RAD[:, :6])
+    assert "finger_1_rad" in streams["gripper-joint_states"].values
+
+
+@pytest.mark.parametrize("stated", ["q1..q6 [rad] = q", "'q1 [rad]' 'q2 [rad]' 'q3 [rad]' q4 q5 q6 [rad] = q"])
+def test_statements_with_the_headings_of_earlier_versions_stay_valid(tmp_path: Path, stated: str) -> None:
+    names = ("base_1", "shoulder_2", "elbow_3", "roll_4", "bend_5", "twist_6")
+    states = [("/joint_states", joint_state(row, names[::-1], ANGLES_RAD[row, 5::-1])) for row in range(ROWS)]
+    bag = write_bag(tmp_path / "bag", states)
+    for more in ((), ("--columns", stated)):
+        stream = imported(bag, RIG, *more).streams["joint_states"]
+        np.testing.assert_allclose(stream.values["actual_q_rad"], ANGLES_RAD[:, :6])
+        (tmp_path / "log.mcap").unlink()
+    assert "base_1 [rad]" in columns_of(bag)[0]["columns"][0]["headings"]

@@ -221,6 +221,12 @@ def unit_in(sheet: Sheet, column: int) -> str:
     return split_heading(sheet.headings[column])[1] or sheet.unit_row[column].strip()
 
 
+def last_number(name: str) -> int | None:
+    """The last number in a name; None where there is none."""
+    numbers = re.findall(r"\d+", name)
+    return int(numbers[-1]) if numbers else None
+
+
 def common_unit(sheet: Sheet, columns: Sequence[int]) -> str:
     """The unit of columns that belong together. SamplesError where they have several."""
     units = {column: unit_in(sheet, column) for column in columns}

@@ -29,7 +29,7 @@ from acquisition.recording.foreign.column_meanings import (
     unit_in,
     without_owner,
 )
-from acquisition.recording.foreign.heading_units import folded
+from acquisition.recording.foreign.heading_units import folded, split_heading
 from acquisition.recording.foreign.rotations import CONVENTIONS
 from acquisition.recording.foreign.sheet import Sheet
 from acquisition.recording.samples import ORIENTATION, POSITION, joint_of
@@ -237,5 +237,8 @@ def _column(sheet: Sheet, name: str) -> int:
             )
         if found:
             return found[0]
+    aliases = [folded(split_heading(alias)[0]) for alias in sheet.aliases]
+    if folded(split_heading(name)[0]) in aliases:
+        return aliases.index(folded(split_heading(name)[0]))
     there = ", ".join(filter(None, sheet.headings))
     raise SamplesError(f"--columns: {sheet.place()} has no column '{shown(name, 40)}'; there are {shown(there)}")

@@ -27,6 +27,7 @@ from acquisition.recording.foreign.column_meanings import (
     Group,
     bare_meaning,
     common_unit,
+    last_number,
     name_of,
 )
 from acquisition.recording.foreign.column_statements import stated_groups, statement
@@ -92,7 +93,7 @@ class _Headings:
             yield self._taken(meaning, columns, stem)
         elif meaning == "q" and (columns := self._named_joints()):
             yield self._taken(meaning, columns)
-        elif meaning == "q" and (most := max(found.values(), key=len)):
+        elif meaning == "q" and (most := max(found.values(), key=len)) and not self._of_another_device(most):
             raise SamplesError(
                 f"{self._sheet.place()}: {len(most)} joint angles ({self._names(most)}) for an arm of {self._n} "
                 f"joints; correct the table, use another rig file, or {REMEDY}"
@@ -115,6 +116,10 @@ class _Headings:
         while (columns := self._free.get(f"{stem}{first + len(out)}")) is not None:
             out.append(self._only(columns))
         return tuple(out)
+
+    def _of_another_device(self, columns: Sequence[int]) -> bool:
+        """Whether they are named joints, fewer than the arm has: those of a gripper or a rail."""
+        return len(columns) < self._n and set(columns) <= set(self._sheet.joint_columns)
 
     def _named_joints(self) -> tuple[int, ...]:
         """The joints of one arm among named joints, in order; empty: none. SamplesError for joints of several arms."""
@@ -182,7 +187,13 @@ class _Headings:
 
 
 def _arms_of_numbers(names: Mapping[int, str], n_joints: int) -> Iterator[tuple[int, ...]]:
-    """Columns whose names differ in one number alone, where these are 1 to n, or 0 to n - 1."""
+    """Columns whose names differ in one number alone, where these are 1 to n, or 0 to n - 1.
+
+    Names that differ in more are an arm where there are no others, and their last numbers are 1 to n.
+    """
+    last = {last_number(name) or 0: column for column, name in names.items()}
+    if len(names) == n_joints and sorted(last) == list(range(1, n_joints + 1)):
+        yield tuple(last[number] for number in sorted(last))
     alike: dict[tuple[str, str], dict[int, int]] = {}
     for column, name in names.items():
         for match in _NUMBER.finditer(name):

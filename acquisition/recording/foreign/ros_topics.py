@@ -8,14 +8,13 @@ The fields of the messages: common_interfaces, sensor_msgs and geometry_msgs of 
 
 import importlib
 import math
-import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from acquisition.recording.errors import RecordingError, shown
-from acquisition.recording.foreign.column_meanings import UR_JOINTS
+from acquisition.recording.foreign.column_meanings import UR_JOINTS, last_number
 from acquisition.recording.foreign.sheet import NotTaken, Raw, Sheet
 from acquisition.recording.mcap.scan import check_batches
 
@@ -26,7 +25,6 @@ POSE_STAMPED, POINT_STAMPED, TRANSFORM_STAMPED = (
 ROS_1 = ".bag"
 OBJECT_BYTES, MESSAGE_BYTES = 400_000_000, 1500  # of all messages of a bag in memory, of a short one
 FRAMES = 100  # frames or bodies of one topic, at most
-_NUMBERED = re.compile(r".*?(\d+)\D*")
 _XYZ, _XYZW = ("x [m]", "y [m]", "z [m]"), ("qx", "qy", "qz", "qw")
 
 Messages = Sequence[tuple[int, Any]]  # when each was received, in ns, and itself
@@ -100,7 +98,7 @@ def _other_topics(connections: Sequence[Any]) -> list[NotTaken]:
 
 def _joint_tables(path: Path, topic: str, messages: Messages) -> Iterator[Sheet]:
     names = list(messages[0][1].name) if messages else []
-    headings = [f"{heading} [rad]" for heading in _joint_headings(names)]
+    headings = [f"{name} [rad]" for name in names]
     rows: list[tuple[Raw, ...]] = []
     for row, (received_ns, message) in enumerate(messages, start=1):
         if list(message.name) != names or len(message.position) != len(names):
@@ -113,21 +111,26 @@ def _joint_tables(path: Path, topic: str, messages: Messages) -> Iterator[Sheet]
     fields = {name: sum(1 for _, one in messages if len(getattr(one, name))) for name in ("velocity", "effort")}
     left = tuple(NotTaken("field", f"{name} of {topic}", JOINT_STATE, count) for name, count in fields.items() if count)
     first = len(made.headings) - len(headings)
-    yield replace(made, not_taken=left, joint_columns=tuple(range(first, len(made.headings))))
+    earlier = _earlier_headings(names)
+    yield replace(
+        made,
+        not_taken=left,
+        joint_columns=tuple(range(first, len(made.headings))),
+        aliases=(*made.headings[:first], *earlier) if earlier else (),
+    )
 
 
-def _joint_headings(names: list[str]) -> list[str]:
-    """q1, q2, ... where the names alone show the order: numbers, or the maker's; else the names.
+def _earlier_headings(names: Sequence[str]) -> tuple[str, ...]:
+    """q1 [rad], q2 [rad], ... of joints that their numbers or their maker order: the headings of earlier versions.
 
-    Which of the names are joints of the arm is decided where its number of joints is known.
+    Statements that were written with such a recording stay valid. Empty: the names show no order.
     """
     if set(names) == set(UR_JOINTS):
-        return [f"q{UR_JOINTS.index(name) + 1}" for name in names]
-    found = [match for name in names if (match := _NUMBERED.fullmatch(name))]
-    numbers = [int(match[1]) for match in found]
-    if sorted(numbers) == list(range(1, len(names) + 1)):
-        return [f"q{number}" for number in numbers]
-    return names
+        return tuple(f"q{UR_JOINTS.index(name) + 1} [rad]" for name in names)
+    numbers = [last_number(name) for name in names]
+    if sorted(number or 0 for number in numbers) == list(range(1, len(names) + 1)):
+        return tuple(f"q{number} [rad]" for number in numbers)
+    return ()
 
 
 def _point_tables(path: Path, topic: str, messages: Messages) -> Iterator[Sheet]:

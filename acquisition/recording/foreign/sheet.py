@@ -53,6 +53,7 @@ class Sheet:
     files: tuple[Path, ...] = ()  # of each row, where they come from several files
     notes: tuple[str, ...] = ()  # what the file states of its columns, for a person
     not_taken: tuple[NotTaken, ...] = ()  # what the file holds beside this table
+    aliases: tuple[str, ...] = ()  # of each heading, another name that a statement may use
     joint_columns: tuple[int, ...] = ()  # whose headings are names of joints, and whose cells are their angles
 
     def place(self, row: int | None = None, column: int | None = None) -> str:
