@@ -275,3 +275,13 @@ def test_statements_with_the_headings_of_earlier_versions_stay_valid(tmp_path: P
         np.testing.assert_allclose(stream.values["actual_q_rad"], ANGLES_RAD[:, :6])
         (tmp_path / "log.mcap").unlink()
     assert "base_1 [rad]" in columns_of(bag)[0]["columns"][0]["headings"]
+
+
+def test_joints_of_a_larger_arm_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    states = [("/joint_states", joint_state(row, PANDA, ANGLES_RAD[row])) for row in range(ROWS)]
+    points = [("/smr", point(row)) for row in range(ROWS)]
+    bag = write_bag(tmp_path / "bag", [*states, *points])
+    assert import_bag(bag, RIG) == 1
+    assert "7 joint angles (panda_joint1 [rad] … panda_joint7 [rad]) for an arm of 6" in " ".join(
+        capsys.readouterr().err.split()
+    )

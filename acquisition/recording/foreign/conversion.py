@@ -287,7 +287,7 @@ def _fault(table: Understanding, group: Group, unit: Unit, *, settled: bool) -> 
         values = values[:, 3::4][:, :3]
     values = values * unit.factor + unit.offset
     if np.isnan(values).all():
-        return None  # no reading speaks against the unit
+        return None  # without a reading no unit can be judged
     largest = float(np.nanmax(np.abs(values), initial=0.0))
     spread = float(np.max(_spreads(values), initial=0.0))
     si = {"rad": "rad", "m": "m", "degC": "°C", "v": "V", "kg": "kg", "rad_s": "rad/s"}.get(group.suffix, group.suffix)

@@ -94,10 +94,13 @@ class _Headings:
         elif meaning == "q" and (columns := self._named_joints()):
             yield self._taken(meaning, columns)
         elif meaning == "q" and (most := max(found.values(), key=len)) and not self._of_another_device(most):
-            raise SamplesError(
-                f"{self._sheet.place()}: {len(most)} joint angles ({self._names(most)}) for an arm of {self._n} "
-                f"joints; correct the table, use another rig file, or {REMEDY}"
-            )
+            raise self._wrong_count(most)
+
+    def _wrong_count(self, columns: Sequence[int]) -> SamplesError:
+        return SamplesError(
+            f"{self._sheet.place()}: {len(columns)} joint angles ({self._names(columns)}) for an arm of {self._n} "
+            f"joints; correct the table, use another rig file, or {REMEDY}"
+        )
 
     def _differ(self, one: Sequence[int], other: Sequence[int]) -> str:
         """Where two readings of the table part first."""
@@ -122,7 +125,10 @@ class _Headings:
         return len(columns) < self._n and set(columns) <= set(self._sheet.joint_columns)
 
     def _named_joints(self) -> tuple[int, ...]:
-        """The joints of one arm among named joints, in order; empty: none. SamplesError for joints of several arms."""
+        """The joints of one arm among named joints, in order; empty: none.
+
+        SamplesError for joints of several arms, or of a larger one.
+        """
         free = {column for columns in self._free.values() for column in columns}
         names = {c: name_of(self._sheet, c) for c in self._sheet.joint_columns if c in free}
         arms = list(dict.fromkeys((*_arms_of_numbers(names, self._n), *_arms_of_makers(names, self._n))))
@@ -130,6 +136,10 @@ class _Headings:
             several = " or ".join(f"{names[c[0]]} … {names[c[-1]]}" for c in arms)
             stated = statement([names[column] for column in arms[0]], "q")
             raise SamplesError(f"{self._sheet.place()}: q may be {several}; state which: {stated}")
+        if not arms:
+            larger = range(self._n + 1, len(names) + 1)
+            if found := next((arm for count in larger for arm in _arms_of_numbers(names, count)), None):
+                raise self._wrong_count(found)
         return arms[0] if arms else ()
 
     def _sets(self) -> Iterator[Group]:
