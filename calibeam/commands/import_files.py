@@ -283,9 +283,12 @@ def _logs(
     recording, started_utc = recording_of(tables, out, stamps)
     if restore_stamps:
         recording = restored_stamps(replace(recording, path=tables[0].sheet.path))
-    about = [columns_file(table, None, SOFTWARE) for table in tables]
+    others = [(*tables[:at], *tables[at + 1 :]) for at in range(len(tables))]
+    about = [columns_file(table, None, SOFTWARE, rest) for table, rest in zip(tables, others, strict=True)]
     for one in about:
         print_columns(console, one)
+    for line in (line for one in about for line in one.examination_lines()):
+        console.print(line, markup=False, highlight=False)
     _agreed(yes=yes)
     names = ", ".join(str(table.sheet.path.name) for table in tables)
     with taken_back(out):
@@ -317,6 +320,8 @@ def _table(table: Understanding, out: Path, *, yes: bool) -> None:
     samples = samples_of(table)
     about = columns_file(table, samples, SOFTWARE)
     print_columns(console, about)
+    for line in about.examination_lines():
+        console.print(line, markup=False, highlight=False)
     _agreed(yes=yes)
     with taken_back(out):
         columns_path = write_session(table, samples, about, out)
@@ -349,14 +354,8 @@ def print_columns(console: Console, about: ColumnsFile) -> None:
         cells = _several(record.headings), record.meaning, record.unit or "—", _several(record.becomes), span
         lines.add_row(*map(Text, cells))  # no markup: a heading may hold [deg]
     console.print(lines)
-    for line in _remarks(about):
+    for line in (*about.notes, *about.not_taken_lines()):
         console.print(line, markup=False, highlight=False)
-
-
-def _remarks(about: ColumnsFile) -> Iterator[str]:
-    yield from about.notes
-    if about.unused:
-        yield f"not used: {', '.join(about.unused)} (keep one with --columns \"'{about.unused[0]}' = its_name\")"
 
 
 def _range(si_unit: str, lowest: float | None, highest: float | None) -> str:

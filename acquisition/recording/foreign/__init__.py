@@ -7,18 +7,11 @@ of a column is a word in `column_meanings`, a new way to write an orientation a 
 line in `heading_units`.
 """
 
-from acquisition.recording.foreign.conversion import (
-    ColumnsFile,
-    Understanding,
-    columns_file,
-    questions,
-    samples_of,
-    understand,
-    write_columns,
-    write_session,
-)
+from acquisition.recording.foreign.columns_record import ColumnsFile, columns_file, write_columns, write_session
+from acquisition.recording.foreign.conversion import Understanding, questions, samples_of, understand
 from acquisition.recording.foreign.logs import KINDS, read_log, recording_of, understand_logs
-from acquisition.recording.foreign.sheet import Sheet, read_seats, read_sheet
+from acquisition.recording.foreign.sheet import Sheet
+from acquisition.recording.foreign.sheet_files import read_seats, read_sheet
 
 __all__ = [
     "KINDS",

@@ -4,22 +4,17 @@ A unit is never assumed. Where none stands, or the one that stands makes values 
 `Question`; `answered` settles it. What a person states is taken, up to the bounds of all files.
 """
 
-import hashlib
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime, time
 from decimal import Decimal
-from pathlib import Path
 
-import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.recording.errors import RecordingError, SamplesError, shown
-from acquisition.recording.files import write_json
+from acquisition.recording.errors import SamplesError, shown
 from acquisition.recording.files.bounds import SPAN_S
-from acquisition.recording.files.explain import suffix_of
 from acquisition.recording.foreign.column_meanings import (
     POSE_MATRIX,
     TEXT,
@@ -27,18 +22,16 @@ from acquisition.recording.foreign.column_meanings import (
     UNUSED,
     Group,
     bare_meaning,
-    understood,
     unit_in,
 )
-from acquisition.recording.foreign.heading_units import AMBIGUOUS, Unit, si_symbol, symbols, unit_of
+from acquisition.recording.foreign.heading_search import understood
+from acquisition.recording.foreign.heading_units import AMBIGUOUS, Unit, symbols, unit_of
 from acquisition.recording.foreign.rotations import CONVENTIONS, bad_matrix, bad_quaternion, of_matrices
 from acquisition.recording.foreign.sheet import Raw, Sheet
 from acquisition.recording.foreign.sheet_times import check_times
-from acquisition.recording.recording import Recording
 from acquisition.recording.rig import Rig, parse_rig
 from acquisition.recording.sample_rules import checked_samples
 from acquisition.recording.samples import TARGET, Cell, Floats, Samples, cells_of, per_joint
-from acquisition.recording.session_folder import export
 
 EPOCH_S = SPAN_S  # a time beyond counts from 1970 or the like
 FEWEST = 3  # rows whose spread shows something of their unit
@@ -201,9 +194,9 @@ def samples_of(table: Understanding) -> Samples:
             f"{sheet.place()}: no columns are understood as the {n_joints} joint angles ({sheet.titles}); state which "
             f'they are: --columns "A1..A{n_joints} [deg] = q", or the row of the headings: --header-row'
         )
-    if len(columns) == n_joints + 1:
+    if not any(group.measures or (group.kept and group.meaning != UNUSED) for group in table.groups):
         raise SamplesError(
-            f"{sheet.place()}: no column is understood as a measurement; state which it is: "
+            f"{sheet.place()}: no column is understood as a measurement ({sheet.titles}); state which it is: "
             '--columns "X Y Z [mm] = position"'
         )
     ordered = {name: columns[name] for name in ("t_s", *per_joint("q", "_rad", n_joints))} | columns
@@ -216,7 +209,7 @@ def converted(table: Understanding, group: Group) -> Floats:
     if group.meaning == TIME:
         times = times_of(sheet, group.columns[0])
         check_times(sheet, group.columns[0], times, unit_of(group.unit))
-        return seconds_since(times, _base(times, group), group)[:, None]
+        return seconds_since(times, base_of(times, group), group)[:, None]
     raw = np.stack([table.numbers[column] for column in group.columns], axis=1)
     unit = unit_of(group.unit) if group.suffix else None
     bare = bare_meaning(group.meaning)
@@ -244,121 +237,6 @@ def seconds_since(times: Sequence[Exact], base: Exact, group: Group) -> Floats:
     exact = any(isinstance(t, Decimal) for t in (*times, base))
     less = [_decimal(t) - _decimal(base) for t in times] if exact else [t - base for t in times]  # pyright: ignore[reportOperatorIssue]
     return np.array([float(t) for t in less], dtype=np.float64) * factor
-
-
-class ColumnRecord(msgspec.Struct, frozen=True):
-    """One line of what was understood: headings, meaning, unit as read, columns that come of it, their range in SI."""
-
-    headings: tuple[str, ...]
-    meaning: str
-    unit: str
-    becomes: tuple[str, ...]
-    si_unit: str  # of `becomes`, `lowest` and `highest`; "" where there is none or it is not known
-    lowest: float | None
-    highest: float | None
-
-
-class ColumnsFile(msgspec.Struct, frozen=True):
-    """Content of the file of columns beside a session folder: how a table was read."""
-
-    schema: int
-    kind: str
-    software: str
-    source: str
-    source_sha256: str
-    sheet: str
-    rows: int
-    columns: tuple[ColumnRecord, ...]
-    unused: tuple[str, ...]
-    notes: tuple[str, ...]
-    stated: str  # as `--columns` takes it: reads the table again in the same way
-
-
-def columns_file(table: Understanding, samples: Samples | None, software: str) -> ColumnsFile:
-    """What was understood, as it is printed and written; without `samples` it is a log, converted here."""
-    sheet = table.sheet
-    used = [group for group in table.groups if group.meaning != UNUSED]
-    return ColumnsFile(
-        1,
-        "calibeam-columns",
-        software,
-        sheet.path.name,
-        _sha256(sheet),
-        sheet.name,
-        len(sheet.rows),
-        tuple(_record(table, group, samples) for group in used),
-        table.unused(),
-        tuple(_notes(table)),
-        ", ".join(_clause(table, group) for group in used),
-    )
-
-
-def _sha256(sheet: Sheet) -> str:
-    """Of the file, or of several one after the other; "" for a folder."""
-    whole = hashlib.sha256()
-    files = [file for file in dict.fromkeys(sheet.files) or (sheet.path,) if file.is_file()]
-    for file in files:
-        whole.update(file.read_bytes())
-    return whole.hexdigest() if files else ""
-
-
-def write_session(table: Understanding, samples: Samples, about: ColumnsFile, folder: Path) -> Path:
-    """rig.toml and samples.csv into a new folder, and beside it the file of columns, whose path is returned.
-
-    RecordingError where the folder is not empty, or the disk refuses.
-    """
-    recording = Recording(folder, table.rig_text, table.rig, samples, complete=True)
-    export(recording, folder)
-    return write_columns((about,), folder)
-
-
-def write_columns(about: Sequence[ColumnsFile], out: Path) -> Path:
-    """The file of columns beside what was made of one table, or a list of them; its path.
-
-    RecordingError where the disk refuses.
-    """
-    columns_path = out.with_name(f"{out.name}.columns.json")
-    content = about[0] if len(about) == 1 else about
-    try:
-        write_json(columns_path, content)
-    except OSError as error:
-        raise RecordingError(f"{columns_path}: cannot be written ({error.strerror}); choose another place") from error
-    return columns_path
-
-
-def _record(table: Understanding, group: Group, samples: Samples | None) -> ColumnRecord:
-    targets = group.targets(table.rig.n_encoders)
-    alike = [k for k, t in enumerate(targets) if t not in TEXT and suffix_of(t) == suffix_of(targets[0])]
-    if samples is None:
-        values = converted(table, group)[:, alike].ravel()
-    else:
-        values = np.concatenate([np.empty(0), *(samples.columns[targets[k]] for k in alike)])
-    there = values[np.isfinite(values)]
-    low, high = (float(there.min()), float(there.max())) if there.size else (None, None)
-    return ColumnRecord(table.headings(group), group.meaning, group.unit, targets, si_symbol(group.suffix), low, high)
-
-
-def _notes(table: Understanding) -> Iterator[str]:
-    sheet = table.sheet
-    time_group = next((group for group in table.groups if group.meaning == TIME), None)
-    if sheet.title:
-        yield f"above the headings, not read: {shown('; '.join(sheet.title), 80)}"
-    for number, file in enumerate(dict.fromkeys(sheet.files), start=1):
-        count = sheet.files.count(file)
-        name = file.absolute().relative_to(sheet.path).with_suffix("").as_posix()
-        yield f"seat {number}: {name}, {count} row{'' if count == 1 else 's'}"
-    if sheet.decimal == ",":
-        yield "decimal comma"
-    if time_group is None:
-        yield "no column of time: rows are taken as one second apart, in the order of the table"
-    elif _base(times_of(sheet, time_group.columns[0]), time_group):
-        yield "time counts from the first row"
-
-
-def _clause(table: Understanding, group: Group) -> str:
-    names = " ".join(f'"{n}"' if "'" in n else f"'{n}'" for n in table.headings(group))
-    unit = f" [{group.unit}]" if group.suffix and group.unit else ""
-    return f"{names}{unit} = {group.meaning}"
 
 
 def _check_whole_rows(sheet: Sheet, group: Group, numbers: Mapping[int, Floats]) -> None:
@@ -408,6 +286,8 @@ def _fault(table: Understanding, group: Group, unit: Unit, *, settled: bool) -> 
     if group.meaning.endswith(POSE_MATRIX):
         values = values[:, 3::4][:, :3]
     values = values * unit.factor + unit.offset
+    if np.isnan(values).all():
+        return None  # without a reading no unit can be judged
     largest = float(np.nanmax(np.abs(values), initial=0.0))
     spread = float(np.max(_spreads(values), initial=0.0))
     si = {"rad": "rad", "m": "m", "degC": "°C", "v": "V", "kg": "kg", "rad_s": "rad/s"}.get(group.suffix, group.suffix)
@@ -484,7 +364,7 @@ def is_dated(sheet: Sheet, column: int) -> bool:
     return bool(cells) and all(isinstance(c, datetime | time) or (isinstance(c, str) and ":" in c) for c in cells)
 
 
-def _base(times: Sequence[Exact], group: Group) -> Exact:
+def base_of(times: Sequence[Exact], group: Group) -> Exact:
     """Where time is counted from: 0, or the first row where it counts from 1970 or the like."""
     unit = unit_of(group.unit)
     factor = 1.0 if unit is None else unit.factor

@@ -5,7 +5,6 @@ meaning of its own is kept under its heading, in SI where its unit is known. `ho
 first row of all tables where it counts from 1970; `device_s` is a column of that name, or the same.
 """
 
-import importlib
 import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
@@ -18,9 +17,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.recording.errors import RecordingError, SamplesError, shown
+from acquisition.recording.errors import SamplesError, shown
 from acquisition.recording.files.plausible import value_fault
-from acquisition.recording.foreign.column_meanings import POSE_MATRIX, TIME, UNUSED, Group, clauses, name_of, prefix_of
+from acquisition.recording.foreign.column_meanings import POSE_MATRIX, TIME, UNUSED, Group, name_of, prefix_of
+from acquisition.recording.foreign.column_statements import clauses
 from acquisition.recording.foreign.conversion import (
     EPOCH_S,
     Exact,
@@ -31,28 +31,18 @@ from acquisition.recording.foreign.conversion import (
     times_of,
     understand,
 )
-from acquisition.recording.foreign.heading_units import si_symbol, unit_of
-from acquisition.recording.foreign.sheet import SUFFIXES, Raw, Sheet, read_sheet
+from acquisition.recording.foreign.heading_units import folded, si_symbol, unit_of
+from acquisition.recording.foreign.ros_topics import ROS_1, read_bag
+from acquisition.recording.foreign.sheet import Sheet
+from acquisition.recording.foreign.sheet_files import SUFFIXES, read_sheet
 from acquisition.recording.foreign.sheet_times import check_times
 from acquisition.recording.mcap.layout import STREAMS_NOTE
-from acquisition.recording.mcap.scan import check_batches
 from acquisition.recording.recording import Channel, Recording, Stamps, Stream, check_declaration
 from acquisition.recording.sample_rules import no_samples
 
-ROS_1 = ".bag"
 BAG_SUFFIXES = (".db3", ".mcap", ROS_1)
 TABLE, BAG = "table", "bag"
 KINDS: Mapping[str, str] = {**dict.fromkeys(SUFFIXES, TABLE), **dict.fromkeys(BAG_SUFFIXES, BAG)}  # by suffix
-JOINT_STATE, POSE_STAMPED = "sensor_msgs/msg/JointState", "geometry_msgs/msg/PoseStamped"
-# Universal Robots' own names, which their driver does not send in this order: ur_description, urdf/ur_macro.xacro
-UR_JOINTS = (
-    "shoulder_pan_joint",
-    "shoulder_lift_joint",
-    "elbow_joint",
-    "wrist_1_joint",
-    "wrist_2_joint",
-    "wrist_3_joint",
-)
 _JOINT_CHANNELS: Mapping[str, str] = {
     "q": "actual_q_rad",
     "cmd": "target_q_rad",
@@ -62,9 +52,7 @@ _JOINT_CHANNELS: Mapping[str, str] = {
     "motor_tau": "motor_torque_nm",
 }
 _UNITS: Mapping[str, str] = {"qd": "rad/s", "tau": "Nm", "motor_tau": "Nm"}  # else rad
-_NUMBERED = re.compile(r".*?(\d+)\D*")
 DEVICE_S = "device_s"
-OBJECT_BYTES, MESSAGE_BYTES = 400_000_000, 1500  # of all messages of a bag in memory, of a short one
 
 
 @dataclass(frozen=True)
@@ -78,13 +66,14 @@ class LogStart:
 def read_log(path: Path, sheet: str | None = None, header_row: int | None = None) -> tuple[Sheet, ...]:
     """The table of a file, or of each topic of a bag. SamplesError, RecordingError naming what cannot be read."""
     is_bag = path.is_dir() or KINDS.get(path.suffix.lower()) == BAG
-    return tuple(_bag(path)) if is_bag else (read_sheet(path, sheet, header_row),)
+    return tuple(read_bag(path)) if is_bag else (read_sheet(path, sheet, header_row),)
 
 
 def understand_logs(sheets: Sequence[Sheet], rig_text: str, rig_name: str, columns: str) -> tuple[Understanding, ...]:
     """What each table means. A clause of `columns` holds for the tables that have its headings.
 
-    SamplesError for a clause of no table, a table without a time, and two tables of one meaning.
+    SamplesError for a clause of no table, a table without a time, two tables of one meaning, and where no table has a
+    column that is understood as more than a time.
     """
     names = [stream_name(sheet) for sheet in sheets]
     if twice := next((name for name in names if names.count(name) > 1), None):
@@ -95,8 +84,8 @@ def understand_logs(sheets: Sequence[Sheet], rig_text: str, rig_name: str, colum
     for sheet in sheets:
         own = {k: clause.text for k, clause in enumerate(stated) if clause.is_of(sheet, stream_name(sheet))}
         used |= set(own)
-        table = understand(sheet, rig_text, rig_name, ", ".join(own.values()), whole_rows=False)
-        tables.append(_with_own_channels(table))
+        tables.append(understand(sheet, rig_text, rig_name, ", ".join(own.values()), whole_rows=False))
+    known = any(_is_known(group) for table in tables for group in table.groups)
     if lost := next((clause for k, clause in enumerate(stated) if k not in used), None):
         raise SamplesError(f"--columns: no log has the headings of '{shown(lost.text, 60)}'; correct them")
     for meaning in _JOINT_CHANNELS:
@@ -107,7 +96,28 @@ def understand_logs(sheets: Sequence[Sheet], rig_text: str, rig_name: str, colum
                 f"'{shown(first, 40)}' and '{shown(second, 40)}' both hold joint angles understood as {meaning}; state "
                 f'what one of them is: --columns "{shown(second, 40)}: A1..A6 [deg] = enc"'
             )
+    tables = [_with_own_channels(table) for table in tables]
+    if not known:
+        _refuse_unknown(tables)
     return tuple(tables)
+
+
+def _refuse_unknown(tables: Sequence[Understanding]) -> None:
+    """SamplesError naming what the files hold, of which nothing is understood."""
+    headings = [h for table in tables for c, h in enumerate(table.sheet.headings) if h and not _is_time(table, c)]
+    topics = [one.says for table in tables for one in table.sheet.not_taken]
+    rows = sum(len(table.sheet.rows) for table in tables)
+    arm = tables[0].rig.n_joints
+    example = f"A1..A{arm} [deg] = q" if arm else f"E1..E{tables[0].rig.n_encoders} [deg] = enc"
+    raise SamplesError(
+        f"{tables[0].sheet.place()}: no joint angles, commands, encoders or measurement are understood; in {rows} rows "
+        f'there are {shown(", ".join((*headings, *topics)), 110)}; state what they are: --columns "{example}"'
+    )
+
+
+def _is_time(table: Understanding, column: int) -> bool:
+    of_time = any(group.meaning == TIME and column in group.columns for group in table.groups)
+    return of_time or folded(name_of(table.sheet, column)) in ("device", "devices")
 
 
 def stream_name(sheet: Sheet) -> str:
@@ -139,6 +149,15 @@ def recording_of(
         notes={STREAMS_NOTE: ", ".join(stream.name for stream in streams)},
     )
     return recording, start.started_utc
+
+
+def _is_known(group: Group) -> bool:
+    """Whether a diagnosis can use it, or a person has named it."""
+    return group.measures or group.meaning in _JOINT_CHANNELS or group.is_temperature or _is_named(group)
+
+
+def _is_named(group: Group) -> bool:
+    return group.kept and group.meaning not in (UNUSED, DEVICE_S)
 
 
 def _with_own_channels(table: Understanding) -> Understanding:
@@ -262,88 +281,3 @@ def _time_group(table: Understanding) -> Group:
 def _factor(group: Group) -> float:
     unit = unit_of(group.unit)
     return 1.0 if unit is None else unit.factor
-
-
-def _bag(path: Path) -> list[Sheet]:
-    """Each topic of joint states and stamped poses of a bag as a table: of ROS 2, or a file of ROS 1."""
-    old = path.suffix.lower() == ROS_1
-    reader = importlib.import_module("rosbags.rosbag1" if old else "rosbags.rosbag2")
-    types = importlib.import_module("rosbags.typesys")
-    if not path.exists():
-        raise RecordingError(f"{path}: no such bag; check the path")
-    try:
-        store = types.get_typestore(types.Stores.ROS1_NOETIC if old else types.Stores.ROS2_HUMBLE)
-        message_of = store.deserialize_ros1 if old else store.deserialize_cdr
-        files = [one for one in path.rglob("*") if one.is_file()] if path.is_dir() else [path]
-        for file in (one for one in files if one.suffix == ".mcap"):
-            check_batches(file)
-        with reader.Reader(path) as bag:
-            there = sorted({f"{c.topic} ({c.msgtype})" for c in bag.connections})
-            wanted = [c for c in bag.connections if c.msgtype in (JOINT_STATE, POSE_STAMPED)]
-            rows: dict[str, list[tuple[int, Any]]] = {c.topic: [] for c in wanted}
-            left = max(OBJECT_BYTES, 16 * sum(one.stat().st_size for one in files))
-            for connection, received_ns, raw in bag.messages(connections=wanted):
-                left -= MESSAGE_BYTES + 2 * len(raw)
-                if left < 0:
-                    raise ValueError(
-                        f"more than {len(rows[connection.topic])} messages of '{connection.topic}': take a part of it"
-                    )
-                rows[connection.topic].append((received_ns, message_of(raw, connection.msgtype)))
-    except Exception as error:  # of damaged bytes the libraries below raise whatever they stumble over
-        raise RecordingError(
-            f"{path}: no bag of ROS that can be read ({shown(str(error) or type(error).__name__, 80)}); check the path"
-        ) from error
-    if not wanted:
-        raise RecordingError(
-            f"{path}: no topic of {JOINT_STATE} or {POSE_STAMPED}; there are {shown(', '.join(there)) or 'none'}"
-        )
-    kinds = {c.topic: c.msgtype for c in wanted}
-    made = [(_joint_table if kinds[topic] == JOINT_STATE else _pose_table)(path, topic, r) for topic, r in rows.items()]
-    if not (filled := [sheet for sheet in made if sheet.rows]):
-        raise RecordingError(f"{path}: no message on {shown(', '.join(rows))}; record the topics, or check the bag")
-    return filled
-
-
-def _joint_table(path: Path, topic: str, messages: Sequence[tuple[int, Any]]) -> Sheet:
-    names = list(messages[0][1].name) if messages else []
-    headings = [f"{heading} [rad]" for heading in _joint_headings(names)]
-    rows: list[tuple[Raw, ...]] = []
-    for row, (received_ns, message) in enumerate(messages, start=1):
-        if list(message.name) != names or len(message.position) != len(names):
-            raise RecordingError(
-                f"{path} topic '{topic}' message {row}: joints {shown(', '.join(message.name))} with "
-                f"{len(message.position)} positions, before {shown(', '.join(names))}; record one set of joints a topic"
-            )
-        rows.append((received_ns, _stamp_s(message), *map(float, message.position)))
-    return _topic(path, topic, headings, rows)
-
-
-def _joint_headings(names: list[str]) -> list[str]:
-    """q1, q2, ... where the names show the order: numbers, or the maker's; else the names, for a person to order."""
-    if set(names) == set(UR_JOINTS):
-        return [f"q{UR_JOINTS.index(name) + 1}" for name in names]
-    found = [match for name in names if (match := _NUMBERED.fullmatch(name))]
-    numbers = [int(match[1]) for match in found]
-    if sorted(numbers) == list(range(1, len(names) + 1)):
-        return [f"q{number}" for number in numbers]
-    return names
-
-
-def _pose_table(path: Path, topic: str, messages: Sequence[tuple[int, Any]]) -> Sheet:
-    headings = ["x [m]", "y [m]", "z [m]", "qx", "qy", "qz", "qw"]
-    rows: list[tuple[Raw, ...]] = []
-    for received_ns, message in messages:
-        p, q = message.pose.position, message.pose.orientation
-        rows.append((received_ns, _stamp_s(message), p.x, p.y, p.z, q.x, q.y, q.z, q.w))
-    return _topic(path, topic, headings, rows)
-
-
-def _topic(path: Path, topic: str, headings: Sequence[str], rows: Sequence[tuple[Raw, ...]]) -> Sheet:
-    names = ("host [ns]", "device [s]", *headings)
-    return Sheet(path, topic, names, ("",) * len(names), tuple(rows), tuple(range(1, len(rows) + 1)))
-
-
-def _stamp_s(message: Any) -> float:
-    """The stamp of the header; NaN where it was never set."""
-    stamp = message.header.stamp
-    return stamp.sec + 1e-9 * stamp.nanosec if stamp.sec or stamp.nanosec else math.nan

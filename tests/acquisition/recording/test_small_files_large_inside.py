@@ -20,7 +20,8 @@ from acquisition.recording.can_log import import_can
 from acquisition.recording.errors import RecordingError, SamplesError
 from acquisition.recording.files.bounds import TABLE_BYTES, TABLE_CELLS, TABLE_COLUMNS
 from acquisition.recording.files.json_file import JsonKind, read_json
-from acquisition.recording.foreign.sheet import NUMBER, read_sheet
+from acquisition.recording.foreign import read_sheet
+from acquisition.recording.foreign.sheet import NUMBER
 from acquisition.recording.mcap import scan
 from acquisition.recording.mcap.scan import Scan
 from acquisition.recording.recording import Recording
@@ -185,7 +186,7 @@ def test_a_cell_in_the_last_column_of_each_row_makes_no_row_of_16_384_cells(tmp_
 
 
 def test_a_grid_of_too_many_cells_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("acquisition.recording.foreign.sheet.GRID_CELLS", 1_000_000)
+    monkeypatch.setattr("acquisition.recording.foreign.sheet_files.GRID_CELLS", 1_000_000)
     cells = b"".join(b'<row r="%d"><c r="XFD%d" s="0"/></row>' % (k, k) for k in range(4, 500))
     with pytest.raises(SamplesError, match=r"a\.xlsx sheet 'Sheet' row 65: 1015820 cells up to here"):
         read_sheet(_workbook(tmp_path / "a.xlsx", sheet1=cells + b"</sheetData>"))

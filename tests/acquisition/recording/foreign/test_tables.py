@@ -478,3 +478,13 @@ def test_files_that_hold_no_table(tmp_path, name, content):
     (tmp_path / name).write_bytes(content)
     with pytest.raises(SamplesError, match="lab"):
         read_sheet(tmp_path / name)
+
+
+def test_the_unit_of_a_column_without_a_reading_is_not_questioned(tmp_path, rig_source):
+    given = session()
+    pairs = zip(given["q"].tolist(), given["position"].tolist(), strict=True)
+    rows = [(*q, None, None, None, *x) for q, x in pairs]
+    headings = [*(f"q{k} [rad]" for k in range(1, JOINTS + 1)), *(f"{a} [m]" for a in ("X", "Y", "Z"))]
+    headings += [f"camera {a} [m]" for a in ("x", "y", "z")]
+    _, samples = imported(write_csv(tmp_path / "lab.csv", headings, rows), rig_source)
+    assert np.isnan(samples.column("x_m")).all()
