@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 from rich.table import Table
 
+from acquisition.recording.checked import READINGS
 from acquisition.recording.examination import not_examined_lines
 from calibeam.console import Console
 from calibrate.diagnose.record.schema import ClockRecord, DiagnosisFile, FindingRecord, TorquesRecord, of_poses
@@ -141,7 +142,8 @@ def print_streams(console: Console, file: DiagnosisFile) -> None:
     _print_torques(console, file)
     failed = (f"not completed: {one.stage}: {one.reason}" for one in file.incomplete)
     ends = not_examined_lines(file.examinations)
-    for line in (*_unexplained(file), *failed, *ends, *(f"next: {says}" for says in file.next)):
+    readings = (f"{one.what}: {one.says}" for one in file.examinations if one.what == READINGS.what and one.says)
+    for line in (*_unexplained(file), *readings, *failed, *ends, *(f"next: {says}" for says in file.next)):
         console.print(line, highlight=False, markup=False)
 
 

@@ -31,6 +31,10 @@ MOST_SEARCH_ROWS = 1200
 # physics moves an arm so far
 FAR_OF_REACH = 0.02
 FEWEST_TIMED = 40  # samples, for the tests of time
+# share of the usual distance between postures; neighbours in the order of capture that are nearer move along a way
+ORDERED_STEP = 0.25
+SAME_POSTURE = 1e-3  # of a posture (cosines and sines); a pose nearer than this is a repeat
+ALIKE_ALONG = 0.5  # correlation of neighbours along a way, from which on they err alike
 FEWEST_TIMED_PAIRS = 20  # times between repeats, for the test of repeats
 TIME_BLOCKS = 5  # blocks of equal length along the session, each predicted from the others
 TIME_EDGE = 0.05  # share of the session at either end in which no change of level is sought: too few rows

@@ -11,12 +11,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
+from scipy.special import ndtr
 
 from calibrate.diagnose import limits
 from calibrate.diagnose.search.bench import Bench
 from calibrate.diagnose.search.noise_law import NoiseLaw, capture_orders, noise_law
 from calibrate.diagnose.search.null import Tail
 from calibrate.diagnose.state.linearised import WhitenedRows
+from calibrate.model.checks.gross_error import postures
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.intp]
@@ -48,6 +50,8 @@ def time_left(bench: Bench, rng: Generator) -> TimeLeft | None:
     }
     if (pairs := _by_gap(bench)) is not None:
         tests["repeats disagree more, the farther apart in time they were taken"] = pairs
+    if (ordered := along_the_way(bench, order)) is not None:
+        return ordered
     law = _short(noise_law(rows, bench.sight, t_s, rng))
     nulls: dict[str, list[Floats]] = {what: [] for what in tests}
     for _ in range(limits.TIME_DRAWS // AT_ONCE):
@@ -61,6 +65,36 @@ def time_left(bench: Bench, rng: Generator) -> TimeLeft | None:
         found.append(TimeLeft(what, seen / max(float(np.mean(null)), 1e-300), p))
     worst = min(found, key=lambda one: one.p)
     return worst if worst.p < limits.TIME_ALPHA and worst.ratio > limits.TIME_FACTOR else None
+
+
+def along_the_way(bench: Bench, order: Ints) -> TimeLeft | None:
+    """Where neighbours in the order of capture are neighbours in posture, too, and err alike: a wander of the noise and
+    an error that changes smoothly with the angles cannot be separated there, so that what is left is not called noise.
+
+    `order` (sample,) by time. None where the poses change at random, or the errors do. Level of a correlation of n
+    pairs by noise: Fisher's z, sigma 1 / sqrt(n - 3).
+    """
+    q = postures(bench.state.drivers.q_rad)[order]
+    step = np.linalg.norm(np.diff(q, axis=0), axis=1)
+    moved = np.flatnonzero(step > limits.SAME_POSTURE)
+    apart = np.linalg.norm(q[moved] - q[(moved + len(q) // 2) % len(q)], axis=1)
+    if len(moved) < limits.FEWEST_TIMED or np.median(step[moved]) > limits.ORDERED_STEP * np.median(apart):
+        return None
+    worst = 0.0
+    for at in capture_orders(bench.state.rows, bench.state.drivers.t_s):
+        if len(at) != len(order):
+            continue  # an instrument that has not read every pose
+        z = bench.sight.residual[at]
+        one, two = z[moved], z[moved + 1]
+        worst = max(worst, float(np.sum(one * two) / np.sqrt(np.sum(one**2) * np.sum(two**2))))
+    p = float(ndtr(-np.arctanh(min(worst, 1.0 - 1e-12)) * np.sqrt(len(moved) - 3.0)))
+    if worst < limits.ALIKE_ALONG or p > limits.TIME_ALPHA:
+        return None
+    what = (
+        f"neighbours in the order of capture err alike (correlation {worst:.2f}), and their postures are neighbours, "
+        "too: noise that wanders or an error that follows the angles; measure the poses again in random order"
+    )
+    return TimeLeft(what, 1.0 / max(1.0 - worst, 1e-3), p)
 
 
 def _short(law: NoiseLaw) -> NoiseLaw:

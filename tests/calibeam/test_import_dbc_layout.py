@@ -92,7 +92,9 @@ def test_a_diagnosis_lists_readings_that_were_left_out(tmp_path: Path, capsys: p
     said = " ".join(capsys.readouterr().out.split())
     assert "no fault" not in said
     assert "no cause found in what was examined" in said
-    assert re.search(r"not tested: encoder 1: readings left out of 600 rows: faster than a joint turns in \d+", said)
+    assert re.search(
+        r"readings of the encoders: encoder 1: readings left out of 600 rows: faster than a joint turns in \d+", said
+    )
 
 
 def test_readings_out_of_the_stated_range_are_counted_apart(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
