@@ -240,6 +240,7 @@ def _judged(joint: int, means: _Means, zero_rad: float | None, *, wraps: bool) -
     found = _fitted(means, plain)
     if found is None:
         return AngleOffset(joint, Outcome.NOT_DETERMINABLE, why="its blocks of time do not determine an offset")
+    found = _beside_a_disc(means, found) if wraps else found
     droop, by_gravity = None, False
     for torque, columns in means.droops():
         other = _fitted(means, [*plain, *columns])
@@ -255,6 +256,18 @@ def _judged(joint: int, means: _Means, zero_rad: float | None, *, wraps: bool) -
     limit_rad = max(found.least(one.offset.sigma) for one in stretches)
     outcome = Outcome.FOUND if decided else Outcome.ABSENT
     return AngleOffset(joint, outcome, stretches, droop, by_gravity, zero_rad is None, limit_rad)
+
+
+def _beside_a_disc(means: _Means, found: _Fit) -> _Fit:
+    """Without steps that a disc off its centre explains as well, since an arm that goes from place to place shows such
+    a disc as levels. It is judged at every joint that moves, however short its way is.
+    """
+    if not found.steps or np.ptp(means.angle) < limits.STANDS_RAD:
+        return found
+    plain = means.columns()
+    disc = _fitted(means, [*plain, *means.turned.T])
+    level = None if disc is None or disc.steps else _with_steps(means, plain, ())
+    return found if level is None else level
 
 
 def _unseen(means: _Means, columns: list[Floats], steps: tuple[int, ...]) -> float:
@@ -293,6 +306,6 @@ def _stretches(means: _Means, found: _Fit, zero_rad: float | None, *, wraps: boo
         offset = float(counted @ found.line.values) - (zero_rad or 0.0)
         offset = (offset + np.pi) % TURN_RAD - np.pi if wraps else offset
         sigma = float(np.sqrt(counted @ found.line.covariance @ counted))
-        beyond = zero_rad is not None and abs(offset) > found.least(sigma)
+        beyond = zero_rad is not None and bool(abs(offset) > found.least(sigma))
         out.append(OffsetStretch(from_s, to_s, Size(offset, sigma), beyond))
     return tuple(out)
