@@ -39,6 +39,7 @@ class Seen:
     slips_judged: Sequence[bool] = ()
     stands: Sequence[Stand] = ()
     windows: Sequence[Window] | None = None
+    silent: Mapping[int, str] = field(default_factory=dict[int, str])  # joint -> how often its second encoder answered
 
     def sentences(self, *physics: str, stream: str = "", where: str = "") -> str:
         """What was found of these kinds, one sentence after the other; empty: nothing."""
@@ -109,6 +110,15 @@ PAIRS = Examination(
     ("position_rad",),
     "`calibeam check LOG` states pace, eccentricity, slips and noise of the encoders",
 )
+
+
+ANSWERING = "record encoders that answer: check wiring, nodes and the signals of the DBC"
+
+
+def _silent(examination: Examination, seen: Seen) -> Records:
+    """Of second encoders that took no part, since they hardly answered."""
+    for joint, why in seen.silent.items():
+        yield examination.not_examined(why, f"joint{joint}", remedy=ANSWERING)
 
 
 def _continuity(seen: Seen) -> Records:
@@ -182,6 +192,7 @@ def _of_clock(
 
 
 def _second(seen: Seen) -> Records:
+    yield from _silent(SECOND, seen)
     why, offsets = seen.missing("encoders", "joints"), seen.offsets.get("encoders", ())
     if why or not offsets:
         clock = seen.clocks.get("encoders")
@@ -201,6 +212,7 @@ def _second(seen: Seen) -> Records:
 
 
 def _slips(seen: Seen) -> Records:
+    yield from _silent(SLIPS, seen)
     why, judged = seen.missing("encoders", "joints"), seen.slips_judged
     if why or not judged:
         clock = seen.clocks.get("encoders")
@@ -230,6 +242,7 @@ def _compliance(seen: Seen) -> Records:
         both = seen.expects("encoders") and seen.expects("torque")
         yield COMPLIANCE.not_examined(why or "no clock of the second encoders", expected=both)
         return
+    yield from _silent(COMPLIANCE, seen)
     for one in seen.bent:
         where = f"joint{one.joint}"
         if one.outcome is Outcome.FOUND:

@@ -75,9 +75,11 @@ def examine(
     encoder of each joint shows at the joint's zero, where that is stated. `arm`: False of a log of encoders alone.
     """
     found, devices = _mended(devices)
+    devices, silent = _answering(devices)
     joints, command = devices.get("joints"), devices.get("command")
     if joints is None:
-        return StreamReport(tuple(found), {}, (), (), stream_examinations(Seen(devices, tuple(found)), arm=arm))
+        seen = Seen(devices, tuple(found), silent=silent)
+        return StreamReport(tuple(found), {}, (), (), stream_examinations(seen, arm=arm))
     stands = stands_of((command or joints).track)
     clocks: dict[str, ClockFit] = {}
     behind: tuple[Following, ...] = ()
@@ -103,7 +105,7 @@ def examine(
             found.append(late_finding(name, late, joints.track.channels))
     found += _rings(joints.track, stands)
     bent, judged_slips = ((), ()) if second is None else (second.bent, second.judged)
-    seen_all = Seen(devices, tuple(found), clocks, behind, offsets, bent, judged_slips, stands, windows)
+    seen_all = Seen(devices, tuple(found), clocks, behind, offsets, bent, judged_slips, stands, windows, silent)
     return StreamReport(tuple(found), clocks, behind, stands, stream_examinations(seen_all), offsets)
 
 
@@ -120,6 +122,22 @@ def _mended(devices: Mapping[str, StreamDevice]) -> tuple[list[StreamFinding], d
         track_faults, out[name] = judged(device, faults)
         found += break_findings(device.track, track_faults)
     return found, out
+
+
+def _answering(devices: dict[str, StreamDevice]) -> tuple[dict[str, StreamDevice], dict[int, str]]:
+    """Without the second encoders that hardly answer, and joint -> how often: a row counts only as a whole."""
+    encoders = devices.get("encoders")
+    if encoders is None:
+        return devices, {}
+    track = encoders.track
+    read = np.isfinite(track.values).sum(axis=0)
+    answers = read >= limits.ANSWERS_SHARE * read.max(initial=0)
+    if answers.all():
+        return devices, {}
+    rows = len(track.values)
+    silent = {track.joint(int(c)): f"read in {read[c]} of {rows} rows" for c in np.flatnonzero(~answers)}
+    left = replace(encoders, track=track.of(np.flatnonzero(answers).tolist()))
+    return {**devices, "encoders": left}, silent
 
 
 @dataclass(frozen=True, eq=False)

@@ -284,3 +284,23 @@ def test_without_its_zero_an_offset_is_not_examined_and_the_remedy_is_stated(sce
     assert "no zero of the second encoder of joint3" in left.reason
     assert "`encoder_zero_rad`" in left.remedy
     assert "`calibeam compare`" in left.remedy
+
+
+def test_an_encoder_that_does_not_answer_is_named_and_the_others_are_examined(scene):
+    """Of joint 2 no reading ever came, of joint 5 one row in ten: a row counts only with the readings of all."""
+    devices = seconds(scene, SECOND_RAD)
+    track = devices["encoders"].track
+    values = plus(track.values, 2, np.nan)
+    values[np.arange(len(values)) % 10 > 0, 4] = np.nan
+    devices["encoders"] = replace(devices["encoders"], track=replace(track, values=values))
+    report = examine(devices, zeros_rad=[0.01] * JOINTS)
+    assert report.clocks["encoders"].offset_s == pytest.approx(15.0, abs=1e-4)
+    (found,) = (one for one in report.findings if one.name.physics == "angle-offset")
+    assert found.name.where == "joint3.angle"
+    for what in (SECOND, "slips of the second encoders"):
+        endings = {one.where: one for one in report.examinations if one.what == what and one.where}
+        assert {where for where, one in endings.items() if one.outcome == "not examined"} == {"joint2", "joint5"}
+        assert endings["joint2"].reason == f"read in 0 of {len(values)} rows"
+        assert endings["joint2"].expected
+        assert "wiring" in endings["joint2"].remedy
+        assert set(endings) == {f"joint{j + 1}" for j in range(JOINTS)}
