@@ -54,6 +54,7 @@ class AngleOffset:
 
     `zeroless`: the zero of the reading is not known, so that only a change and a droop are findings. `droop`: half the
     swing over the recorded poses of what follows gravity (`by_gravity`) or the joint's own angle once a turn.
+    `zero_rad`: what a known zero took off every offset. `steady`: one level over the whole recording, without a slip.
     `limit_rad`: the smallest offset, or change of it, that would have been found.
     """
 
@@ -65,6 +66,8 @@ class AngleOffset:
     zeroless: bool = False
     limit_rad: float | None = None
     why: str = ""
+    zero_rad: float = 0.0
+    steady: bool = True
 
     def known(self, *, stepped: bool, bent: bool) -> "AngleOffset":
         """Of two encoders: without what a slip or a measured torque explains, and what a disc off its centre may do."""
@@ -73,7 +76,8 @@ class AngleOffset:
         droop = None if self.droop is None or bent or self.droop.value < usual else self.droop
         found = droop is not None or len(stretches) > 1 or any(one.found for one in stretches)
         outcome = self.outcome if self.why else Outcome.FOUND if found else Outcome.ABSENT
-        return replace(self, outcome=outcome, stretches=stretches, droop=droop)
+        steady = not stepped and len(stretches) == 1
+        return replace(self, outcome=outcome, stretches=stretches, droop=droop, steady=steady)
 
 
 def angle_offsets(
@@ -255,7 +259,10 @@ def _judged(joint: int, means: _Means, zero_rad: float | None, *, wraps: bool) -
     decided = droop is not None or len(stretches) > 1 or any(one.found for one in stretches)
     limit_rad = max(found.least(one.offset.sigma) for one in stretches)
     outcome = Outcome.FOUND if decided else Outcome.ABSENT
-    return AngleOffset(joint, outcome, stretches, droop, by_gravity, zero_rad is None, limit_rad)
+    zeroless, steady = zero_rad is None, len(stretches) == 1
+    return AngleOffset(
+        joint, outcome, stretches, droop, by_gravity, zeroless, limit_rad, zero_rad=zero_rad or 0.0, steady=steady
+    )
 
 
 def _beside_a_disc(means: _Means, found: _Fit) -> _Fit:
