@@ -70,17 +70,20 @@ def _streams(checked: Checked) -> Records:
         found = checked.sentences(where, *IN_STREAMS)
         if found:
             yield STREAMS.found(found, where)
-        elif len(stream.host_s) < FEWEST_ROWS:
-            yield STREAMS.not_examined(f"only {len(stream.host_s)} rows", where)
-        elif not _rises(stream):
-            yield STREAMS.not_examined("neither stamps nor a counter rise", where)
+        elif why := _unusable(stream):
+            yield STREAMS.not_examined(why, where)
         else:
             yield STREAMS.nothing(1.0, "missing row", where)
 
 
-def _rises(stream: Stream) -> bool:
+def _unusable(stream: Stream) -> str:
+    """Why the order of its rows shows nothing; empty: it does."""
+    if len(stream.host_s) < FEWEST_ROWS:
+        return f"only {len(stream.host_s)} rows"
     times = (stream.device_s, stream.host_s)
-    return any(np.isfinite(t).all() and np.ptp(t) > 0.0 for t in times) and bool(np.ptp(stream.sequence) > 0)
+    if not any(np.isfinite(t).all() and np.ptp(t) > 0.0 for t in times):
+        return "its stamps do not rise"
+    return "" if np.ptp(stream.sequence) > 0 else "its counter does not rise"
 
 
 def _stamps(checked: Checked) -> Records:
@@ -92,8 +95,8 @@ def _stamps(checked: Checked) -> Records:
         found = checked.sentences(where, Problem.BURSTS, Problem.CLOCK_STEP, Problem.RATE)
         if found:
             yield STAMPS.found(found, where)
-        elif len(stream.host_s) < FEWEST_ROWS or not _rises(stream):
-            yield STAMPS.not_examined("fewer than three rows with stamps that rise", where)
+        elif why := _unusable(stream):
+            yield STAMPS.not_examined(why, where)
         else:
             yield _of_sampling(stream, where)
 
@@ -113,13 +116,14 @@ def _of_sampling(stream: Stream, where: str) -> ExaminationRecord:
 def _readings(checked: Checked) -> Records:
     streams = [s for s in checked.recording.streams.values() if POSITION in s.values]
     if not streams:
-        stated = checked.recording.rig.devices is not None and checked.recording.rig.devices.encoders is not None
+        stated = checked.recording.rig.devices.encoders is not None
         yield READINGS.not_examined(
             "no readings of encoders were recorded", expected=stated and is_log(checked.recording)
         )
     for stream in streams:
         where = f"stream {stream.name}"
-        values = stream.values[POSITION].reshape(len(stream.host_s), -1)
+        values = stream.values[POSITION]
+        values = values.reshape(len(values), int(np.prod(values.shape[1:])))  # also without one row
         found = checked.sentences(where, Problem.READINGS) or checked.sentences("file", Problem.READINGS)
         missing = np.isnan(values).sum(axis=0)
         if found:

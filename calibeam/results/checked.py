@@ -14,8 +14,9 @@ from acquisition.recording.examination import (
     not_examined_lines,
 )
 from calibeam.results.controller_findings import CONTROLLER_ARM, controller_examination
-from calibrate.diagnose.streams import devices_of, examine_encoders
+from calibrate.diagnose.streams import EncoderPair, devices_of, examine_encoders
 from calibrate.fit.controller_arm import ControllerArm
+from calibrate.quantities import angle_with_sigma
 
 SIGMAS = 5.0  # of an eccentricity that is found
 PAIRS = Examination(
@@ -42,13 +43,21 @@ def _pairs(checked: CheckedRecording) -> Iterator[ExaminationRecord]:
         yield PAIRS.not_examined("no log of encoders alone", expected=False)
         return
     for pair in examine_encoders(device)[1]:
-        where = f"encoder {pair.number}"
-        if pair.slips:
-            yield PAIRS.found(f"{len(pair.slips)} slips", where)
+        where, found = f"encoder {pair.number}", "; ".join(_of_pair(pair))
+        if found:
+            yield PAIRS.found(found, where)
         elif pair.once_rad is not None:
             yield PAIRS.nothing(SIGMAS * pair.once_rad.sigma, "rad", where)
         else:
             yield PAIRS.not_examined(pair.why or "the readings do not determine it", where)
+
+
+def _of_pair(pair: EncoderPair) -> Iterator[str]:
+    once = pair.once_rad
+    if once is not None and once.value > SIGMAS * once.sigma:
+        yield f"eccentricity {angle_with_sigma(once.value, once.sigma)}, once a turn"
+    for slip in pair.slips:
+        yield f"slip of {angle_with_sigma(slip.size_rad, slip.sigma_rad)}"
 
 
 def _controller(checked: CheckedRecording) -> Iterator[ExaminationRecord]:

@@ -1,7 +1,7 @@
 """Clocks, gaps, late channels, ringing and slips in recorded streams, without any model of the arm."""
 
 from calibrate.diagnose.streams.clock import ClockFit, ClockStatus, clock_between
-from calibrate.diagnose.streams.encoder_pairs import examine_encoders
+from calibrate.diagnose.streams.encoder_pairs import EncoderPair, examine_encoders
 from calibrate.diagnose.streams.examine import StreamReport
 from calibrate.diagnose.streams.recorded import StreamDevice, devices_of
 from calibrate.diagnose.streams.stream_findings import StreamFinding
@@ -11,6 +11,7 @@ from calibrate.diagnose.streams.track import Outcome, Track, TrackCurve, white_n
 __all__ = [
     "ClockFit",
     "ClockStatus",
+    "EncoderPair",
     "Outcome",
     "StreamDevice",
     "StreamFinding",
