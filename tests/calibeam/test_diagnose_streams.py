@@ -1,6 +1,8 @@
 """`diagnose` of a recording with streams: what is wrong with them stands beside the physics of the samples."""
 
+import html
 import json
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -11,6 +13,8 @@ from benchmarks.moving_arm import motion, sampled
 from benchmarks.stream_cases import JOINT_NOISE_RAD, servo_scene
 from benchmarks.stream_devices import devices_of_scene
 from calibeam.cli import run
+from calibeam.results import diagnosis
+from calibrate.diagnose.streams.examinations import STREAM_EXAMINATIONS
 from simulators.conceal.case import conceal
 from simulators.conceal.case_files import write_case
 from simulators.conceal.wanted import Wanted
@@ -127,3 +131,25 @@ def test_without_a_stated_zero_a_comparison_finds_that_it_moved(folder, tmp_path
     assert (found["where"], found["level"], said["verdict"]) == ("joint3.angle", "encoder-zeros", "mismatch")
     assert found["sizes"]["zero_rad"]["value"] == pytest.approx(more_rad, abs=1e-5)
     assert found["says"].replace("\N{NO-BREAK SPACE}", " ") in " ".join(capsys.readouterr().out.split())
+
+
+def test_streams_whose_examination_failed_are_in_the_file_on_the_screen_and_on_the_page(
+    folder, tmp_path, capsys, monkeypatch
+):
+    def broken(*_args):
+        raise np.linalg.LinAlgError("singular matrix")
+
+    monkeypatch.setattr(diagnosis, "streams_of", broken)
+    path, out = recorded(tmp_path / "recording.mcap", folder, LATE_S), tmp_path / "diagnosis.json"
+    assert run(["diagnose", str(path), "--out", str(out), "--verbose"]) == 0
+    said = json.loads(out.read_text())
+    endings = [one for one in said["examinations"] if one["reason"].startswith("the stage failed: LinAlgError")]
+    assert {one["what"] for one in endings} == {one.what for one, _ in STREAM_EXAMINATIONS}
+    assert all(one["outcome"] == "not examined" and one["expected"] and "report" in one["remedy"] for one in endings)
+    assert [one["stage"] for one in said["incomplete"]] == ["streams"]
+    shown = " ".join(capsys.readouterr().out.split())
+    page = " ".join(html.unescape(re.sub("<[^>]+>", " ", out.with_suffix(".html").read_text(encoding="utf-8"))).split())
+    for text in (shown, page):
+        assert "streams: LinAlgError: singular matrix" in text
+        assert "following error: the stage failed: LinAlgError: singular matrix" in text
+    assert "Not examined" in page

@@ -2,6 +2,7 @@
 
 from calibrate.diagnose.streams.clock import ClockFit, ClockStatus, clock_between
 from calibrate.diagnose.streams.encoder_pairs import EncoderPair, examine_encoders
+from calibrate.diagnose.streams.examinations import stream_examinations_left_out
 from calibrate.diagnose.streams.examine import StreamReport
 from calibrate.diagnose.streams.recorded import StreamDevice, devices_of
 from calibrate.diagnose.streams.stream_findings import StreamFinding
@@ -22,6 +23,7 @@ __all__ = [
     "devices_of",
     "examine_encoders",
     "sample_windows",
+    "stream_examinations_left_out",
     "streams_of",
     "white_noise",
     "with_streams",

@@ -313,3 +313,8 @@ def stream_examinations(seen: Seen, *, arm: bool = True) -> tuple[ExaminationRec
     if not arm:
         return (*_continuity(seen), PAIRS.not_examined("it is a part of the check of a log", expected=False))
     return tuple(record for _, examine in STREAM_EXAMINATIONS for record in examine(seen))
+
+
+def stream_examinations_left_out(reason: str, remedy: str) -> tuple[ExaminationRecord, ...]:
+    """Of each of them that it did not take place, for one reason and with one remedy."""
+    return tuple(one.not_examined(reason, remedy=remedy) for one, _ in STREAM_EXAMINATIONS)
