@@ -1,4 +1,4 @@
-"""Zeros of second encoders in two recordings: arbitrary, but the same as long as nothing slipped or was set anew."""
+"""Zeros of second encoders in two recordings: arbitrary, but the same as long as nothing slipped or was set again."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
