@@ -31,6 +31,8 @@ SECOND_ZEROS = Examination(
 )
 POSES = Examination("settled poses", ("q", "readings"), "record settled samples, and measure more poses")
 IN_SAMPLES = frozenset((Level.RIG, Level.JOINT_ZEROS, Level.LINKS, Level.ENCODER_ZEROS, Level.FRAMES, Level.JOINTS))
+WITHOUT_READING = ("command", "joints")  # links of the chain that no instrument shows
+DIFFER = "differ"  # verdict of a reconciliation
 WITHOUT_STREAMS = "not both of the two have streams"
 IN_CAUSES = frozenset((Level.EFFECTS, Level.UNEXPLAINED))
 
@@ -63,12 +65,19 @@ def _readings(asked: Compared) -> ExaminationRecord:
     found = asked.differences(IN_SAMPLES)
     if found:
         return READINGS.found("; ".join(one.says for one in found))
-    noise = [(r.noise if r.noise is not None else r.rms_coordinate_after, r.unit) for r in asked.file.readings]
-    noise += [(one.scatter, "") for one in asked.file.links if not noise]
-    limit, unit = max(((n, u) for n, u in noise if np.isfinite(n)), default=(None, ""))
-    if limit is None:
+    apart = [one for one in asked.file.links if one.parts]
+    if apart:
+        return READINGS.found("; ".join(f"{one.link} differ by {one.rms_own:.3g} {one.unit} (rms)" for one in apart))
+    noise = [
+        (one.instrument, one.noise if one.noise is not None else one.rms_coordinate_after, one.unit)
+        for one in asked.file.readings
+    ] or [(one.link, one.scatter, one.unit) for one in asked.file.links if one.link not in WITHOUT_READING]
+    known = [(name, value, unit) for name, value, unit in noise if np.isfinite(value)]
+    if not known:
         return READINGS.not_examined("the two share no reading")
-    return READINGS.nothing(limit, unit)
+    if len({unit for _, _, unit in known}) > 1:
+        return READINGS.nothing(None, "", says="; ".join(f"{name} {value:.3g} {unit}" for name, value, unit in known))
+    return READINGS.nothing(max(value for _, value, _ in known), known[0][2])
 
 
 def _causes(asked: Compared) -> ExaminationRecord:
@@ -156,6 +165,8 @@ def _of_poses(file: ReconcileFile) -> ExaminationRecord:
         worst = max(file.unseen, key=lambda one: one.noise_m)
         left = "; ".join(file.remains)
         return POSES.found(left) if left else POSES.nothing(AGREES * worst.noise_m, "m")
+    if file.all_rows and file.verdict == DIFFER and not file.torques:
+        return POSES.found(file.says)
     why = "; ".join(file.remains) if file.all_rows or not file.torques else "no settled samples were recorded"
     return POSES.not_examined(why or "too few rows", expected=not file.torques or bool(file.all_rows))
 
