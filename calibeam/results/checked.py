@@ -14,8 +14,9 @@ from acquisition.recording.examination import (
     not_examined_lines,
 )
 from calibeam.results.controller_findings import CONTROLLER_ARM, controller_examination
-from calibrate.diagnose.streams import EncoderPair, devices_of, examine_encoders
+from calibrate.diagnose.streams import devices_of, examine_encoders
 from calibrate.fit.controller_arm import ControllerArm
+from calibrate.model.effects.term import Size
 from calibrate.quantities import angle_with_sigma
 
 SIGMAS = 5.0  # of an eccentricity that is found
@@ -43,7 +44,8 @@ def _pairs(checked: CheckedRecording) -> Iterator[ExaminationRecord]:
         yield PAIRS.not_examined("no log of encoders alone", expected=False)
         return
     for pair in examine_encoders(device)[1]:
-        where, found = f"encoder {pair.number}", "; ".join(_of_pair(pair))
+        slips = [Size(one.size_rad, one.sigma_rad) for one in pair.slips]
+        where, found = f"encoder {pair.number}", "; ".join(_in_words(pair.once_rad, slips))
         if found:
             yield PAIRS.found(found, where)
         elif pair.once_rad is not None:
@@ -52,12 +54,10 @@ def _pairs(checked: CheckedRecording) -> Iterator[ExaminationRecord]:
             yield PAIRS.not_examined(pair.why or "the readings do not determine it", where)
 
 
-def _of_pair(pair: EncoderPair) -> Iterator[str]:
-    once = pair.once_rad
+def _in_words(once: Size | None, slips: Sequence[Size]) -> Iterator[str]:
     if once is not None and once.value > SIGMAS * once.sigma:
         yield f"eccentricity {angle_with_sigma(once.value, once.sigma)}, once a turn"
-    for slip in pair.slips:
-        yield f"slip of {angle_with_sigma(slip.size_rad, slip.sigma_rad)}"
+    yield from (f"slip of {angle_with_sigma(one.value, one.sigma)}" for one in slips)
 
 
 def _controller(checked: CheckedRecording) -> Iterator[ExaminationRecord]:

@@ -38,7 +38,7 @@ from calibrate.diagnose.record.schema import (
 )
 from calibrate.diagnose.record.to_file import file_of
 from calibrate.diagnose.stages import Stage, Stages
-from calibrate.diagnose.streams import stream_examinations_left_out, streams_of, with_streams
+from calibrate.diagnose.streams import streams_of, with_streams
 from calibrate.diagnose.with_model import known_before, model_of_diagnosis, only_new, with_known_model
 from calibrate.errors import DataError
 from calibrate.model.model_file import ModelFile, read_model
@@ -163,8 +163,7 @@ def _with_streams(
     stages, fitted = Stages(), None if found.physics is None else found.physics.model
     whole = stages.attempt(Stage.STREAMS, lambda: with_streams(file, streams_of(recording, fitted)), None)
     if whole is None:
-        left_out = stream_examinations_left_out(f"the stage failed: {stages.failed[-1].reason}", REPORT)
-        whole = msgspec.structs.replace(file, examinations=(*file.examinations, *left_out))
+        whole = with_streams(file, None, failed=stages.failed[-1].reason)
     broken = TORQUES_IN_MOTION.not_examined("the stage failed", remedy=REPORT)
     torques = stages.attempt(Stage.TORQUES, lambda: _torques_of(recording, model), broken)
     failed = tuple(IncompleteRecord(one.stage.value, one.reason) for one in stages.failed)

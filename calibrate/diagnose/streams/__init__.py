@@ -1,8 +1,7 @@
 """Clocks, gaps, late channels, ringing and slips in recorded streams, without any model of the arm."""
 
 from calibrate.diagnose.streams.clock import ClockFit, ClockStatus, clock_between
-from calibrate.diagnose.streams.encoder_pairs import EncoderPair, examine_encoders
-from calibrate.diagnose.streams.examinations import stream_examinations_left_out
+from calibrate.diagnose.streams.encoder_pairs import examine_encoders
 from calibrate.diagnose.streams.examine import StreamReport
 from calibrate.diagnose.streams.recorded import StreamDevice, devices_of
 from calibrate.diagnose.streams.stream_findings import StreamFinding
@@ -12,7 +11,6 @@ from calibrate.diagnose.streams.track import Outcome, Track, TrackCurve, white_n
 __all__ = [
     "ClockFit",
     "ClockStatus",
-    "EncoderPair",
     "Outcome",
     "StreamDevice",
     "StreamFinding",
@@ -23,7 +21,6 @@ __all__ = [
     "devices_of",
     "examine_encoders",
     "sample_windows",
-    "stream_examinations_left_out",
     "streams_of",
     "white_noise",
     "with_streams",
