@@ -47,6 +47,7 @@ READINGS = Examination(
     (POSITION,),
     "record encoders that answer: check wiring, nodes and the signals of the DBC",
 )
+NO_REMEDY = "no remedy is needed"  # of what the rig does not have
 IN_STREAMS = (Problem.SILENT, Problem.GAP, Problem.TIME_ORDER, Problem.DUPLICATE_TIME, Problem.SATURATED)
 
 
@@ -55,6 +56,8 @@ def _samples(checked: Checked) -> Records:
     found = checked.sentences("samples")
     if found:
         yield SAMPLES.found(found)
+    elif not checked.recording.rig.n_joints:
+        yield SAMPLES.not_examined("the rig has no arm that settles", expected=False, remedy=NO_REMEDY)
     elif np.isfinite(times_s).sum() < 2 or not np.ptp(times_s[np.isfinite(times_s)]) > 0.0:
         yield SAMPLES.not_examined(f"{len(times_s)} settled samples with times that rise", expected=not log)
     else:

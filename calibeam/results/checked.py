@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 from acquisition.recording import Finding, Recording
-from acquisition.recording.checked import RECORDING_EXAMINATIONS, recording_examinations
+from acquisition.recording.checked import NO_REMEDY, RECORDING_EXAMINATIONS, recording_examinations
 from acquisition.recording.examination import (
     FOUND,
     Examination,
@@ -64,7 +64,7 @@ def _controller(checked: CheckedRecording) -> Iterator[ExaminationRecord]:
     if checked.recording.rig.n_joints:
         yield controller_examination(checked.recording, checked.arm)
     else:
-        yield CONTROLLER_ARM.not_examined("the rig has no arm", expected=False)
+        yield CONTROLLER_ARM.not_examined("the rig has no arm", expected=False, remedy=NO_REMEDY)
 
 
 BEYOND_THE_RECORDING: tuple[tuple[Examination, Callable[[CheckedRecording], Iterator[ExaminationRecord]]], ...] = (
