@@ -55,7 +55,7 @@ def _samples(checked: Checked) -> Records:
     times_s, log = checked.recording.samples.column("t_s"), is_log(checked.recording)
     found = checked.sentences("samples")
     if log and not len(times_s):
-        return
+        return  # a log, or a rig without an arm that settles
     if found:
         yield SAMPLES.found(found)
     elif np.isfinite(times_s).sum() < 2 or not np.ptp(times_s[np.isfinite(times_s)]) > 0.0:
@@ -73,17 +73,20 @@ def _streams(checked: Checked) -> Records:
         found = checked.sentences(where, *IN_STREAMS)
         if found:
             yield STREAMS.found(found, where)
-        elif len(stream.host_s) < FEWEST_ROWS:
-            yield STREAMS.not_examined(f"only {len(stream.host_s)} rows", where)
-        elif not _rises(stream):
-            yield STREAMS.not_examined("neither stamps nor a counter rise", where)
+        elif why := _unusable(stream):
+            yield STREAMS.not_examined(why, where)
         else:
             yield STREAMS.nothing(1.0, "missing row", where)
 
 
-def _rises(stream: Stream) -> bool:
+def _unusable(stream: Stream) -> str:
+    """Why the order of its rows shows nothing; empty: it does."""
+    if len(stream.host_s) < FEWEST_ROWS:
+        return f"only {len(stream.host_s)} rows"
     times = (stream.device_s, stream.host_s)
-    return any(np.isfinite(t).all() and np.ptp(t) > 0.0 for t in times) and bool(np.ptp(stream.sequence) > 0)
+    if not any(np.isfinite(t).all() and np.ptp(t) > 0.0 for t in times):
+        return "its stamps do not rise"
+    return "" if np.ptp(stream.sequence) > 0 else "its counter does not rise"
 
 
 def _stamps(checked: Checked) -> Records:
@@ -95,8 +98,8 @@ def _stamps(checked: Checked) -> Records:
         found = checked.sentences(where, Problem.BURSTS, Problem.CLOCK_STEP, Problem.RATE)
         if found:
             yield STAMPS.found(found, where)
-        elif len(stream.host_s) < FEWEST_ROWS or not _rises(stream):
-            yield STAMPS.not_examined("fewer than three rows with stamps that rise", where)
+        elif why := _unusable(stream):
+            yield STAMPS.not_examined(why, where)
         else:
             yield _of_sampling(stream, where)
 
@@ -119,7 +122,8 @@ def _readings(checked: Checked) -> Records:
         yield READINGS.not_examined("no readings of encoders were recorded")
     for stream in streams:
         where = f"stream {stream.name}"
-        values = stream.values[POSITION].reshape(len(stream.host_s), -1)
+        values = stream.values[POSITION]
+        values = values.reshape(len(values), int(np.prod(values.shape[1:])))  # also without one row
         found = checked.sentences(where, Problem.READINGS) or checked.sentences("file", Problem.READINGS)
         read = values[:, np.isfinite(values).any(axis=0)]  # a joint without an encoder has no reading at all
         missing = np.isnan(read)

@@ -15,6 +15,7 @@ from acquisition.recording.files.bounds import Label, Sentence, Statistic
 
 Ending = Literal["found", "nothing found", "not examined"]
 FOUND, NOTHING, NOT_EXAMINED = "found", "nothing found", "not examined"
+NOT_EXAMINED_LINE = f"{NOT_EXAMINED}: "
 
 
 class ExaminationRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -87,4 +88,4 @@ def not_examined_lines(records: Sequence[ExaminationRecord]) -> Iterator[str]:
         groups.setdefault((one.what, one.reason, one.remedy), []).append(one.where)
     for (what, reason, remedy), places in groups.items():
         named = ", ".join(place for place in places if place)
-        yield f"not examined: {what}{f' ({named})' if named else ''}: {reason}; {remedy}"
+        yield f"{NOT_EXAMINED_LINE}{what}{f' ({named})' if named else ''}: {reason}; {remedy}"

@@ -17,6 +17,8 @@ from acquisition.recording.examination import (
 from calibeam.results.controller_findings import CONTROLLER_ARM, controller_examination
 from calibrate.diagnose.streams import devices_of, examine_encoders
 from calibrate.fit.controller_arm import ControllerArm
+from calibrate.model.effects.term import Size
+from calibrate.quantities import angle_with_sigma
 
 SIGMAS = 5.0  # of an eccentricity that is found
 PAIRS = Examination(
@@ -44,13 +46,20 @@ def _pairs(checked: CheckedRecording) -> Iterator[ExaminationRecord]:
             yield PAIRS.not_examined("no readings of encoders were recorded")
         return
     for pair in examine_encoders(device)[1]:
-        where = f"encoder {pair.number}"
-        if pair.slips:
-            yield PAIRS.found(f"{len(pair.slips)} slips", where)
+        slips = [Size(one.size_rad, one.sigma_rad) for one in pair.slips]
+        where, found = f"encoder {pair.number}", "; ".join(_in_words(pair.once_rad, slips))
+        if found:
+            yield PAIRS.found(found, where)
         elif pair.once_rad is not None:
             yield PAIRS.nothing(SIGMAS * pair.once_rad.sigma, "rad", where)
         else:
             yield PAIRS.not_examined(pair.why or "the readings do not determine it", where)
+
+
+def _in_words(once: Size | None, slips: Sequence[Size]) -> Iterator[str]:
+    if once is not None and once.value > SIGMAS * once.sigma:
+        yield f"eccentricity {angle_with_sigma(once.value, once.sigma)}, once a turn"
+    yield from (f"slip of {angle_with_sigma(one.value, one.sigma)}" for one in slips)
 
 
 def _controller(checked: CheckedRecording) -> Iterator[ExaminationRecord]:

@@ -27,6 +27,7 @@ CONTROLLER_ARM = Examination(
     f"record the robot with its tool poses (controller_x_m … controller_rz_rad) in {FEWEST} or more different poses",
 )
 UNRELATED_M = 1e-3  # no arm leaves as much; angles and poses of other times do
+REMEDY = "record poses that turn the tool about two axes that are not parallel"
 MOST = 8  # differences in one sentence
 
 
@@ -100,6 +101,11 @@ def sentence(found: ControllerArm) -> str:
     rest = f" and {more} more" if more else ""
     unknown = f"; not determined: {counted(len(found.undetermined), 'number')}" if found.undetermined else ""
     tools = f"; {tool}" if found.other_tool else ""
+    if not named:
+        return (
+            "the controller computes with another arm or base than the rig file, of which these poses determine no "
+            f"number; record poses in which every joint turns{tools}; {left}"
+        )
     return (
         f"the controller computes with another arm than the rig file: {', '.join(named)}{rest} (controller less rig "
         f"file){unknown}{tools}; {left}; `calibeam check --controller-arm` writes it as a rig file"
@@ -117,7 +123,8 @@ def _tool(found: ControllerArm) -> str:
     along, about = (sigma[:3].tolist(), sigma[3:].tolist())
     at = ", ".join(length_with_sigma(v, s) if np.isfinite(s) else open_ for v, s in zip(point, along, strict=True))
     turned = ", ".join(angle_with_sigma(v, s) if np.isfinite(s) else open_ for v, s in zip(turn, about, strict=True))
-    return f"its tool is at {at} in the flange (x, y, z), turned by {turned} about x, y, z"
+    says = f"its tool is at {at} in the flange (x, y, z), turned by {turned} about x, y, z"
+    return says if np.all(np.isfinite(sigma)) else f"{says} ({REMEDY})"
 
 
 def write_controller_arm(rig: Rig, found: ControllerArm | None, source: Path, path: Path) -> None:

@@ -167,7 +167,9 @@ def _with_streams(
     file: DiagnosisFile, recording: Recording, found: Diagnosed, model: ModelFile | None
 ) -> tuple[Diagnosed, DiagnosisFile]:
     stages, fitted = Stages(), None if found.physics is None else found.physics.model
-    whole = stages.attempt(Stage.STREAMS, lambda: with_streams(file, streams_of(recording, fitted)), file)
+    whole = stages.attempt(Stage.STREAMS, lambda: with_streams(file, streams_of(recording, fitted)), None)
+    if whole is None:
+        whole = with_streams(file, None, failed=stages.failed[-1].reason)
     broken = TORQUES_IN_MOTION.not_examined("the stage failed", remedy=REPORT)
     torques = stages.attempt(Stage.TORQUES, lambda: _torques_of(recording, model), broken)
     failed = tuple(IncompleteRecord(one.stage.value, one.reason) for one in stages.failed)

@@ -48,9 +48,14 @@ def pair_zeros(measured: StreamDevice, simulated: StreamDevice) -> tuple[ZeroCha
 
 
 def _levels(report: StreamReport | None) -> Mapping[int, tuple[Size, float]]:
-    """Joint -> offset over the whole recording, and the smallest one that counts."""
+    """Joint -> reading less joint over the whole recording, whatever zero its rig file states, and the smallest change
+    that counts.
+    """
     offsets = () if report is None else report.offsets.get("encoders", ())
-    return {o.joint: (o.stretches[0].offset, o.limit_rad or 0.0) for o in offsets if len(o.stretches) == 1}
+    levels = {o.joint: (o.stretches[0].offset, o) for o in offsets if o.stretches and o.steady}
+    return {
+        joint: (Size(at.value + one.zero_rad, at.sigma), one.limit_rad or 0.0) for joint, (at, one) in levels.items()
+    }
 
 
 def _change(where: str, noun: str, one: tuple[Size, float], two: tuple[Size, float]) -> ZeroChange:

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
+import numpy as np
 from msgspec import structs
 
 from acquisition.recording import Recording
@@ -73,9 +74,18 @@ def _readings(asked: ComparedPair) -> Records:
     found += [f"{one.link} differs by {one.rms_own:.3g} {one.unit} rms" for one in asked.file.links if one.parts]
     if found:
         yield READINGS.found("; ".join(found))
+        return
+    noise = [
+        (one.instrument, one.noise if one.noise is not None else one.rms_coordinate_after, one.unit)
+        for one in asked.file.readings
+    ] or [(one.link, one.scatter, one.unit) for one in links]
+    known = [(name, value, unit) for name, value, unit in noise if np.isfinite(value)]
+    if not known:
+        yield READINGS.not_examined("the two share no reading")
+    elif len({unit for _, _, unit in known}) > 1:
+        yield READINGS.nothing(None, "", says="; ".join(f"{name} {value:.3g} {unit}" for name, value, unit in known))
     else:
-        widest = max(links, key=lambda one: one.noise or one.rms_own)
-        yield READINGS.nothing(widest.noise or widest.rms_own, widest.unit)
+        yield READINGS.nothing(max(value for _, value, _ in known), known[0][2])
 
 
 def _causes(asked: ComparedPair) -> Records:

@@ -188,7 +188,7 @@ def compare_logs(measured: Recording, simulated: Recording, software: str) -> Co
 
     DataError where one holds no readings of encoders, or the two hold different numbers of encoders.
 
-    Zeros of encoders are arbitrary and decide nothing; undecidable where the two do not show one motion.
+    Zeros of encoders are arbitrary, but the same in both logs; undecidable where the two do not show one motion.
     """
     devices = [devices_of(one).get(ZEROLESS) for one in (measured, simulated)]
     for recording, device in zip((measured, simulated), devices, strict=True):

@@ -39,6 +39,9 @@ FARTHEST = 1e3  # m and rad: no pose of an arm, nor is what is no number
 OUTLYING = 6.0  # sigma (of the median): a pose that was written at another time than its angles
 AXES = ("x", "y", "z", "rx", "ry", "rz")
 FLAT = 1e-9  # of an axis in another one
+FREELY = 1e-9  # of the largest singular value: what lies below, the poses do not determine
+AWAY = 0.3  # m and rad: how far another solution is sought along what the poses do not determine
+APART = 1e-6  # m and rad: a number that differs by more between two solutions is not determined
 SAME_M = 1e-6  # of a tool's point: rounded in a table
 PARTS = ("tool", "base", "zeros", "links")
 POSES = (("actual_tcp_pose_m_rad",), ("controller_position_m", "controller_rotation_rad"))  # the second of an import
@@ -232,20 +235,24 @@ class _Fit:
         pulls = scale[:, None] * np.einsum("kni,ni->kn", whole, r)
         return pulls @ pulls.T
 
+    def moved(self, at: _State, parts: Sequence[str], step: Floats) -> _State:
+        """`step` (column,): of the arm added, of base and tool as motions, in the base's and in the tool's own axes."""
+        index, by = index_of(self.arm.parameters), dict(zip((p.name for p in self.columns(parts)), step, strict=True))
+        theta = at.theta.copy()
+        for name in by.keys() & index.keys():
+            theta[index[name]] += by[name]
+        base, tool = (_motion(by, part) for part in ("base", "tool"))
+        return _State(theta, base @ at.base, at.tool @ tool)
+
     def solved(self, parts: Sequence[str], start: _State) -> _State:
         at, columns = start, self.columns(parts)
         if not columns:
             return at
-        index, scale = index_of(self.arm.parameters), np.array([p.plausible for p in columns])
+        scale = np.array([p.plausible for p in columns])
         for _ in range(STEPS):
             J = self.jacobian(at, parts).reshape(-1, len(columns)) * scale
-            step = scale * np.linalg.lstsq(J, self.residual(at).ravel(), rcond=1e-10)[0]
-            by = dict(zip((p.name for p in columns), step.tolist(), strict=True))
-            theta = at.theta.copy()
-            for name in by.keys() & index.keys():
-                theta[index[name]] += by[name]
-            base, tool = (_motion(by, part) for part in ("base", "tool"))
-            at = _State(theta, base @ at.base, at.tool @ tool)
+            step = scale * np.asarray(np.linalg.lstsq(J, self.residual(at).ravel(), rcond=1e-10)[0], dtype=np.float64)
+            at = self.moved(at, parts, step)
             if np.max(np.abs(step)) < SMALLEST:
                 break
         return at
@@ -317,25 +324,28 @@ def _sizes(left: Floats) -> tuple[float, float]:
 def _stated(rig: Rig, fit: _Fit, at: _State, parts: tuple[str, ...], left_out: int) -> ControllerArm:
     columns, names = fit.columns(parts), [p.name for p in fit.arm.parameters]
     left = fit.residual(at) * np.repeat(fit.sizes, 3)
-    theta = dict(zip(names, at.theta.tolist(), strict=True))
-    base = np.concatenate([at.base[:3, 3], Rotation.from_matrix(at.base[:3, :3]).as_rotvec()])
-    value = theta | {f"base.{axis}": v for axis, v in zip(AXES, base.tolist(), strict=True)}
+    theta, value = dict(zip(names, at.theta.tolist(), strict=True)), _numbers(fit, at)
     differences, undetermined, tool_sigma = list[ArmDifference](), list[str](), None
     if columns:
         seen = analyse(fit.jacobian(at, parts).reshape(-1, len(columns)), columns)
         limit = float(-ndtri(0.5 * LEVEL / len(columns)))
         sigmas = np.maximum(seen.sigma, np.sqrt(np.diag(fit.covariance(at, parts))))
-        tool_sigma = _tool_sigma(at, columns, np.maximum(sigmas, ROUNDING))
+        tool_sigma, open_ = _tool_sigma(at, columns, np.maximum(sigmas, ROUNDING)), _open(fit, at, parts)
+        if tool_sigma is not None:  # a base that the poses cannot tell from the tool may be another one, too
+            beside = open_ | _open(fit, at, [p for p in PARTS if p in parts or p == "base"])
+            tool_sigma = np.where([f"tool.{axis}" in beside for axis in AXES], np.inf, tool_sigma)
         for p, sigma in zip(columns, sigmas.tolist(), strict=True):
             if not np.isfinite(sigma):
                 undetermined.append(f"{p.name}: {seen.reason(p.name)}")
+            elif not p.name.startswith("tool.") and p.name in open_:
+                undetermined.append(f"{p.name}: it depends on numbers that these poses do not determine")
             elif not p.name.startswith("tool.") and abs(value[p.name]) > max(limit * sigma, ROUNDING * 10.0):
                 differences.append(ArmDifference(p.name, p.unit, value[p.name], sigma))
     stated = fit.poses.T_flange_tool
     tool = at.tool if stated is None else at.tool @ stated[-1]
     m, rad = (float(np.sqrt(np.mean(part**2))) for part in (left[:, :3], left[:, 3:]))
     own_tool = _differs(rig, tool, max(m, ROUNDING))
-    named = tuple(p for p in parts if p != "tool") if differences else ()
+    named = tuple(p for p in parts if p != "tool") if differences or undetermined else ()
     source = fit.poses.source
     return ControllerArm(
         named,
@@ -352,6 +362,38 @@ def _stated(rig: Rig, fit: _Fit, at: _State, parts: tuple[str, ...], left_out: i
         rad,
         source,
     )
+
+
+def _numbers(fit: _Fit, at: _State) -> dict[str, float]:
+    """By name: corrections of the arm, shift and rotation vector of the base, point and turns of the tool."""
+    base = [*at.base[:3, 3], *Rotation.from_matrix(at.base[:3, :3]).as_rotvec()]
+    tool = [*at.tool[:3, 3], *Rotation.from_matrix(at.tool[:3, :3]).as_euler("xyz")]
+    names = [p.name for p in fit.arm.parameters]
+    names += [f"{part}.{axis}" for part in ("base", "tool") for axis in AXES]
+    return dict(zip(names, map(float, (*at.theta, *base, *tool)), strict=True))
+
+
+def _open(fit: _Fit, at: _State, parts: Sequence[str]) -> set[str]:
+    """Names of numbers that another solution has otherwise, away along all that the poses do not determine.
+
+    Near a solution a number may seem determined that is none: the point of a tool whose turn is open goes on a circle.
+    """
+    columns, here = fit.columns(parts), fit.solved(parts, at)
+    scale = np.array([p.plausible for p in columns])
+    _, size, ways = np.linalg.svd(fit.jacobian(here, parts).reshape(-1, len(columns)) * scale, full_matrices=True)
+    size = np.concatenate([size, np.zeros(len(columns) - len(size))])
+    way: Floats = scale * np.sum(ways[size <= FREELY * size[0]], axis=0)
+    if not way.any():
+        return set()
+    there = fit.solved(parts, fit.moved(here, parts, AWAY * way / np.max(np.abs(way))))
+    one, other = _numbers(fit, here), _numbers(fit, there)
+    return {name for name in one if abs(_apart(name, one[name], other[name])) > APART}
+
+
+def _apart(name: str, one: float, other: float) -> float:
+    """Of turns less than half a turn."""
+    turns = name.rpartition(".")[2].startswith("r")
+    return (other - one + np.pi) % (2.0 * np.pi) - np.pi if turns else other - one
 
 
 def _tool_sigma(at: _State, columns: Sequence[Parameter], sigmas: Floats) -> Floats | None:

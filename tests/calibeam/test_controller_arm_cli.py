@@ -36,9 +36,10 @@ def controller(lengthened_m=0.0):
 def recorded(tmp_path):
     """A robot's stream as the RTDE driver declares it, along a path through the room."""
 
-    def made(arm, tool=NONE, samples=1500, name="recording.mcap", rig=RIG):
+    def made(arm, tool=NONE, samples=1500, name="recording.mcap", rig=RIG, joints=range(6), stated=True):
         t = np.linspace(0.0, 1.0, samples)[:, None]
         q = np.sin(2.0 * np.pi * t * np.array([1.0, 2.0, 3.0, 5.0, 7.0, 11.0]) + np.arange(6)) - [0, 1, 0, 1, 0, 0]
+        q[:, [j for j in range(6) if j not in joints]] = 0.4
         poses = np.array([pose_of(arm.tool(row.tolist(), frame_of(tool))) for row in q])
         channels = (
             Channel("actual_q_rad", "rad", (6,)),
@@ -54,7 +55,9 @@ def recorded(tmp_path):
                 "actual_tcp_pose_m_rad": poses,
                 "tcp_offset_m_rad": np.tile(tool, (samples, 1)),
             }
-            writer.stream("robot", channels).append(1000.0 + number * 2e-3, number * 2e-3, number, values)
+            kept = channels if stated else channels[:2]
+            values = {channel.name: values[channel.name] for channel in kept}
+            writer.stream("robot", kept).append(1000.0 + number * 2e-3, number * 2e-3, number, values)
         return path, q
 
     return made
@@ -78,6 +81,44 @@ def test_another_tool_is_information(recorded, capsys):
         in found["says"]
     )
     assert controller_notes(read(path)) == ()
+
+
+ERROR = (0.04, 0.0, 0.0, 0.0, 0.0, 0.0)  # of a tool, 40 mm
+ARM = "arm of the controller"
+
+
+def ending(path, capsys):
+    """What `check` prints, and the record of this examination."""
+    assert run(["check", str(path)]) == 0
+    shown = capsys.readouterr().out.replace("\N{NO-BREAK SPACE}", " ")
+    assert run(["check", str(path), "--json"]) == 0
+    (one,) = (e for e in json.loads(capsys.readouterr().out)["examinations"] if e["what"] == ARM)
+    return shown, one
+
+
+def test_a_tool_that_the_controller_does_not_state_is_printed_with_sigma(recorded, capsys):
+    shown, one = ending(recorded(controller(), ERROR, stated=False)[0], capsys)
+    assert "with another tool: its tool is at 40.0000000 ± 0.0000010 mm, " in shown
+    assert "not determined" not in shown
+    assert one["outcome"] == "found"
+
+
+def test_poses_about_one_axis_leave_the_tool_not_determined(recorded, capsys):
+    shown, one = ending(recorded(controller(), ERROR, joints=[5], stated=False)[0], capsys)
+    assert "its tool is at not determined, not determined, not determined in the flange" in shown
+    assert "about two axes that are not parallel" in shown
+    assert one["outcome"] == "found"
+
+
+@pytest.mark.parametrize("poses", [4, 8])
+def test_few_poses_are_not_examined_and_not_without_errors(recorded, capsys, poses):
+    shown, one = ending(recorded(controller(), ERROR, samples=poses, stated=False)[0], capsys)
+    assert (one["outcome"], one["expected"], one["where"]) == ("not examined", True, "stream robot")
+    assert one["reason"] == f"{poses} different poses of the controller's tool, fewer than 20"
+    assert "in 20 or more different poses" in one["remedy"]
+    assert f"not examined: {ARM} (stream robot): {one['reason']}; {one['remedy']}" in shown
+    assert "nothing wrong in what was examined: " in shown
+    assert "no errors" not in shown
 
 
 def test_another_arm_is_named_and_written(recorded, tmp_path, capsys):

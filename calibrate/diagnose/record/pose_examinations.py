@@ -36,7 +36,7 @@ def _physics(file: DiagnosisFile) -> ExaminationRecord:
     left = [u.says for u in (file.unexplained, *file.also_unexplained) if u is not None]
     if found or left:
         return PHYSICS.found("; ".join((*found, *left)))
-    if failed := _failures(file, *DECIDING):
+    if failed := _failures(file, *DECIDING, Stage.DETECTION):
         few = any(one.stage == Stage.SEARCH.value and "samples" in one.reason for one in file.incomplete)
         return PHYSICS.not_examined(failed, remedy=MEASURE_MORE if few else REPORT)
     if not file.smallest:

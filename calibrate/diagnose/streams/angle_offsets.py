@@ -53,6 +53,7 @@ class AngleOffset:
 
     `zeroless`: the zero of the reading is not known, so that only a change and a droop are findings. `droop`: half the
     swing over the recorded poses of what follows gravity (`by_gravity`) or the joint's own angle once a turn.
+    `zero_rad`: what a known zero took off every offset. `steady`: one level over the whole recording, without a slip.
     `limit_rad`: the smallest offset, or change of it, that would have been found.
     """
 
@@ -64,6 +65,8 @@ class AngleOffset:
     zeroless: bool = False
     limit_rad: float | None = None
     why: str = ""
+    zero_rad: float = 0.0
+    steady: bool = True
 
     def known(self, *, stepped: bool, bent: bool) -> "AngleOffset":
         """Of two encoders: without what a slip or a measured torque explains, and what a disc off its centre may do."""
@@ -72,7 +75,8 @@ class AngleOffset:
         droop = None if self.droop is None or bent or self.droop.value < usual else self.droop
         found = droop is not None or len(stretches) > 1 or any(one.found for one in stretches)
         outcome = self.outcome if self.why else Outcome.FOUND if found else Outcome.ABSENT
-        return replace(self, outcome=outcome, stretches=stretches, droop=droop)
+        steady = not stepped and len(stretches) == 1
+        return replace(self, outcome=outcome, stretches=stretches, droop=droop, steady=steady)
 
 
 def angle_offsets(
@@ -239,6 +243,7 @@ def _judged(joint: int, means: _Means, zero_rad: float | None, *, wraps: bool) -
     found = _fitted(means, plain)
     if found is None:
         return AngleOffset(joint, Outcome.NOT_DETERMINABLE, why="its blocks of time do not determine an offset")
+    found = _beside_a_disc(means, found) if wraps else found
     droop, by_gravity = None, False
     for torque, columns in means.droops():
         other = _fitted(means, [*plain, *columns])
@@ -253,7 +258,22 @@ def _judged(joint: int, means: _Means, zero_rad: float | None, *, wraps: bool) -
     decided = droop is not None or len(stretches) > 1 or any(one.found for one in stretches)
     limit_rad = max(found.least(one.offset.sigma) for one in stretches)
     outcome = Outcome.FOUND if decided else Outcome.ABSENT
-    return AngleOffset(joint, outcome, stretches, droop, by_gravity, zero_rad is None, limit_rad)
+    zeroless, steady = zero_rad is None, len(stretches) == 1
+    return AngleOffset(
+        joint, outcome, stretches, droop, by_gravity, zeroless, limit_rad, zero_rad=zero_rad or 0.0, steady=steady
+    )
+
+
+def _beside_a_disc(means: _Means, found: _Fit) -> _Fit:
+    """Without steps that a disc off its centre explains as well, since an arm that goes from place to place shows such
+    a disc as levels. It is judged at every joint that moves, however short its way is.
+    """
+    if not found.steps or np.ptp(means.angle) < limits.STANDS_RAD:
+        return found
+    plain = means.columns()
+    disc = _fitted(means, [*plain, *means.turned.T])
+    level = None if disc is None or disc.steps else _with_steps(means, plain, ())
+    return found if level is None else level
 
 
 def _unseen(means: _Means, columns: list[Floats], steps: tuple[int, ...]) -> float:
@@ -292,6 +312,6 @@ def _stretches(means: _Means, found: _Fit, zero_rad: float | None, *, wraps: boo
         offset = float(counted @ found.line.values) - (zero_rad or 0.0)
         offset = (offset + np.pi) % TURN_RAD - np.pi if wraps else offset
         sigma = float(np.sqrt(counted @ found.line.covariance @ counted))
-        beyond = zero_rad is not None and abs(offset) > found.least(sigma)
+        beyond = zero_rad is not None and bool(abs(offset) > found.least(sigma))
         out.append(OffsetStretch(from_s, to_s, Size(offset, sigma), beyond))
     return tuple(out)

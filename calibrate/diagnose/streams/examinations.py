@@ -42,6 +42,7 @@ class StreamsSeen:
     slips_judged: Sequence[bool] = ()
     stands: Sequence[Stand] = ()
     windows: Sequence[Window] | None = None
+    silent: Mapping[int, str] = field(default_factory=dict[int, str])  # joint -> how often its second encoder answered
     stated: frozenset[str] = frozenset()  # devices that the rig file states
 
     def sentences(self, *physics: str, stream: str = "", where: str = "") -> str:
@@ -115,6 +116,15 @@ PAIRS = Examination(
 )
 
 
+ANSWERING = "record encoders that answer: check wiring, nodes and the signals of the DBC"
+
+
+def _silent(examination: Examination, seen: StreamsSeen) -> Records:
+    """Of second encoders that took no part, since they hardly answered."""
+    for joint, why in seen.silent.items():
+        yield examination.not_examined(why, f"joint{joint}", remedy=ANSWERING)
+
+
 def _continuity(seen: StreamsSeen) -> Records:
     if not seen.devices:
         yield CONTINUITY.not_examined("no stream was recorded", expected=False)
@@ -186,6 +196,7 @@ def _of_clock(
 
 
 def _second(seen: StreamsSeen) -> Records:
+    yield from _silent(SECOND, seen)
     why, offsets = seen.missing("encoders", "joints"), seen.offsets.get("encoders", ())
     if why or not offsets:
         clock = seen.clocks.get("encoders")
@@ -205,6 +216,7 @@ def _second(seen: StreamsSeen) -> Records:
 
 
 def _slips(seen: StreamsSeen) -> Records:
+    yield from _silent(SLIPS, seen)
     why, judged = seen.missing("encoders", "joints"), seen.slips_judged
     if why or not judged:
         clock = seen.clocks.get("encoders")
@@ -234,6 +246,7 @@ def _compliance(seen: StreamsSeen) -> Records:
         both = seen.expects("encoders") and seen.expects("torque")
         yield COMPLIANCE.not_examined(why or "no clock of the second encoders", expected=both)
         return
+    yield from _silent(COMPLIANCE, seen)
     for one in seen.bent:
         where = f"joint{one.joint}"
         if one.outcome is Outcome.FOUND:
@@ -304,3 +317,8 @@ def stream_examinations(seen: StreamsSeen, *, arm: bool = True) -> tuple[Examina
     if not arm:
         return (*_continuity(seen), PAIRS.not_examined("it is a part of the check of a log", expected=False))
     return tuple(record for _, examine in STREAM_EXAMINATIONS for record in examine(seen))
+
+
+def stream_examinations_left_out(reason: str, remedy: str) -> tuple[ExaminationRecord, ...]:
+    """Of each of them that it did not take place, for one reason and with one remedy."""
+    return tuple(one.not_examined(reason, remedy=remedy) for one, _ in STREAM_EXAMINATIONS)

@@ -77,11 +77,11 @@ def examine(
     `stated`: devices of the rig, recorded or not.
     """
     found, devices = _mended(devices)
+    devices, silent = _answering(devices)
     joints, command = devices.get("joints"), devices.get("command")
     if joints is None:
-        return StreamReport(
-            tuple(found), {}, (), (), stream_examinations(StreamsSeen(devices, tuple(found), stated=stated), arm=arm)
-        )
+        nothing = StreamsSeen(devices, tuple(found), silent=silent, stated=stated)
+        return StreamReport(tuple(found), {}, (), (), stream_examinations(nothing, arm=arm))
     stands = stands_of((command or joints).track)
     clocks: dict[str, ClockFit] = {}
     behind: tuple[Following, ...] = ()
@@ -107,7 +107,9 @@ def examine(
             found.append(late_finding(name, late, joints.track.channels))
     found += _rings(joints.track, stands)
     bent, judged_slips = ((), ()) if second is None else (second.bent, second.judged)
-    seen_all = StreamsSeen(devices, tuple(found), clocks, behind, offsets, bent, judged_slips, stands, windows, stated)
+    seen_all = StreamsSeen(
+        devices, tuple(found), clocks, behind, offsets, bent, judged_slips, stands, windows, silent, stated
+    )
     return StreamReport(tuple(found), clocks, behind, stands, stream_examinations(seen_all), offsets)
 
 
@@ -124,6 +126,22 @@ def _mended(devices: Mapping[str, StreamDevice]) -> tuple[list[StreamFinding], d
         track_faults, out[name] = judged(device, faults)
         found += break_findings(device.track, track_faults)
     return found, out
+
+
+def _answering(devices: dict[str, StreamDevice]) -> tuple[dict[str, StreamDevice], dict[int, str]]:
+    """Without the second encoders that hardly answer, and joint -> how often: a row counts only as a whole."""
+    encoders = devices.get("encoders")
+    if encoders is None:
+        return devices, {}
+    track = encoders.track
+    read = np.isfinite(track.values).sum(axis=0)
+    answers = read >= limits.ANSWERS_SHARE * read.max(initial=0)
+    if answers.all():
+        return devices, {}
+    rows = len(track.values)
+    silent = {track.joint(int(c)): f"read in {read[c]} of {rows} rows" for c in np.flatnonzero(~answers)}
+    left = replace(encoders, track=track.of(np.flatnonzero(answers).tolist()))
+    return {**devices, "encoders": left}, silent
 
 
 @dataclass(frozen=True, eq=False)

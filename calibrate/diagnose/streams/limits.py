@@ -46,6 +46,7 @@ FEWEST_EQUAL = 5  # equal readings in a row that are looked at
 # steps of its own resolution, or sigmas of another device's noise, by which that one moved meanwhile
 MOVED_MEANWHILE = 10.0
 GOES_ON_STEPS = 1.5  # largest step near a run of equal readings; a joint that stuck leaves it by no more
+ANSWERS_SHARE = 0.5  # share of the rows of the encoder that answers most often; one with fewer is left out, and stated
 GAP_PERIODS = 5.0  # sampling periods; a longer pause is not bridged by a curve, since an arm can do anything meanwhile
 DARK = 0.2  # share of the usual light; a beam half off a face falls from full to nothing within its own width
 PRINTED_ROWS = 8  # rows that are printed one by one

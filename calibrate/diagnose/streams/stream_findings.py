@@ -191,7 +191,7 @@ def _offset_finding(stream: str, one: AngleOffset, stretch: OffsetStretch, *, ch
     way = "more" if size.value >= 0.0 else "less"
     says = (
         f"the reading of joint {one.joint} in {stream} shows {angle_with_sigma(abs(size.value), size.sigma)} {way}"
-        f"{since}{when}"
+        f"{when}{since}"
     )
     ends = (stretch.from_s, stretch.to_s) if changes else (None, None)
     return StreamFinding(name, stream, Outcome.FOUND, {which: size}, *ends, CERTAIN, says)

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from acquisition.recording import Recording
 from acquisition.recording.rig import Rig
 from calibrate.diagnose.assess.diagnosis import NAMED, Named, Verdict
+from calibrate.diagnose.record.pose_examinations import REPORT
 from calibrate.diagnose.record.schema import (
     ClockRecord,
     DiagnosisFile,
@@ -31,6 +32,7 @@ from calibrate.diagnose.record.schema import (
 from calibrate.diagnose.state.fitted import Fitted
 from calibrate.diagnose.streams.angle_offsets import GravityLevers
 from calibrate.diagnose.streams.clock import ClockFit
+from calibrate.diagnose.streams.examinations import stream_examinations_left_out
 from calibrate.diagnose.streams.examine import Predicted, StreamReport, examine
 from calibrate.diagnose.streams.recorded import StreamDevice, by_host, devices_of
 from calibrate.diagnose.streams.settling import Window
@@ -181,8 +183,13 @@ EXPLAINS = {
 }
 
 
-def with_streams(file: DiagnosisFile, report: StreamReport | None) -> DiagnosisFile:
-    """The diagnosis with what its recording's streams show; findings of the samples stay in front."""
+def with_streams(file: DiagnosisFile, report: StreamReport | None, *, failed: str = "") -> DiagnosisFile:
+    """The diagnosis with what its recording's streams show; findings of the samples stay in front. `failed`: why there
+    is no report although there are streams.
+    """
+    if failed:
+        left_out = stream_examinations_left_out(f"the stage failed: {failed}", REPORT)
+        return replace(file, examinations=(*file.examinations, *left_out))
     if report is None:
         return file
     new_findings = [_finding(one) for one in report.findings if not _known(one, file)]

@@ -6,6 +6,7 @@ tested and rejected, what these poses cannot show, missing columns, faults of th
 
 from collections.abc import Iterator, Sequence
 
+from acquisition.recording.examination import NOT_EXAMINED_LINE, not_examined_lines
 from calibrate.diagnose.record.schema import DiagnosisFile, FindingRecord, NameRecord
 from calibrate.quantities import (
     DASH,
@@ -146,6 +147,7 @@ MOST_PAIRS = 40  # of confusable causes: the file holds them all
 def limits(file: DiagnosisFile, held: Sequence[FindingRecord] = ()) -> Html:
     """Chapter `diagnosis-limits`; `held`: findings that the calibrated arm of the page holds already."""
     lead = "What could be there and was not found, or could not be."
+    left = [line.removeprefix(NOT_EXAMINED_LINE) for line in not_examined_lines(file.examinations)]
     return section(
         "diagnosis-limits",
         LIMITS_TITLE,
@@ -153,6 +155,7 @@ def limits(file: DiagnosisFile, held: Sequence[FindingRecord] = ()) -> Html:
         *_unexplained(file),
         *_listed("Found as well, and part of the calibrated arm already", [f.says for f in held]),
         *_listed("Not completed", [f"{one.stage}: {one.reason}" for one in file.incomplete]),
+        *_listed("Not examined", left),
         *_listed("Faults of the file", [b.says for b in file.blunders]),
         *_streams(file),
         *_listed("Derived, not recorded", list(file.derived)),

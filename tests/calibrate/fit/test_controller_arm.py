@@ -30,14 +30,14 @@ def links(**changed):
     return out
 
 
-def poses(arm, tool=TOOL, base=(0.0,) * 6, *, stated=False, noise=0.0):
+def poses(arm, tool=TOOL, base=(0.0,) * 6, *, stated=False, noise=0.0, at=Q):
     T_tool, rng = frame_of(tool), np.random.default_rng(8)
-    T = np.array([_matrix(arm.tool(q.tolist(), T_tool)) for q in Q])
+    T = np.array([_matrix(arm.tool(q.tolist(), T_tool)) for q in at])
     T = transform(np.array(base[:3]), np.array(base[3:])) @ T
-    T[:, :3, 3] += noise * rng.normal(size=(len(Q), 3))
-    T[:, :3, :3] = Rotation.from_rotvec(noise * rng.normal(size=(len(Q), 3))).as_matrix() @ T[:, :3, :3]
+    T[:, :3, 3] += noise * rng.normal(size=(len(at), 3))
+    T[:, :3, :3] = Rotation.from_rotvec(noise * rng.normal(size=(len(at), 3))).as_matrix() @ T[:, :3, :3]
     tools = np.tile(_matrix(T_tool), (len(Q), 1, 1)) if stated else None
-    return ControllerPoses(Q, T, tools, "stream robot")
+    return ControllerPoses(at, T, tools, "stream robot")
 
 
 def _matrix(frame):
@@ -104,6 +104,46 @@ def test_a_factory_calibration_is_found_and_predicts_other_postures():
     assert {"link2.offset", "link3.offset", "link4.offset"}.isdisjoint(named(found))
     assert any("link3.offset" in why for why in found.undetermined)
     assert found.left_m < 1e-9
+
+
+SIDEWAYS = (0.04, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+def about(joint):
+    """Postures in which this joint alone turns."""
+    q = np.tile([0.3, -1.0, 1.1, -0.5, 0.7, 0.2], (len(Q), 1))
+    q[:, joint - 1] = np.linspace(-2.0, 2.0, len(Q))
+    return q
+
+
+@pytest.mark.parametrize("noise", [0.0, 1e-6])
+def test_the_tool_has_sigmas_that_hold_its_errors(noise):
+    found = controller_arm(RIG, poses(NominalArm(links()), base=BASE, noise=noise))
+    apart = np.abs(found.T_flange_tool[:3, 3] - np.array(TOOL[:3]))
+    assert np.all(apart < 5.0 * found.tool_sigma[:3] + 1e-10)
+    assert np.all(found.tool_sigma < 2.0 * noise + 1e-8)
+
+
+@pytest.mark.parametrize("noise", [0.0, 1e-5])
+@pytest.mark.parametrize("joint", [1, 6])
+@pytest.mark.parametrize("tool", [SIDEWAYS, TOOL])
+@pytest.mark.parametrize("base", [(0.0,) * 6, (0.01, 0.0, 0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.003, 0.01, 0.0, 0.0), BASE])
+def test_poses_about_one_axis_give_no_number_that_they_do_not_determine(tool, base, joint, noise):
+    """Base and tool turn against each other about that axis; what is stated all the same is true."""
+    found = controller_arm(RIG, poses(NominalArm(links()), tool, base, noise=noise, at=about(joint)))
+    assert not np.isfinite(found.tool_sigma[:3]).all()
+    for one in found.differences:
+        true = dict(zip((f"base.{axis}" for axis in ("x", "y", "z", "rx", "ry", "rz")), base, strict=True))[one.name]
+        assert abs(one.value - true) < 5.0 * one.sigma + 1e-8, one
+    known = np.isfinite(found.tool_sigma[:3])
+    apart = np.abs(found.T_flange_tool[:3, 3] - np.array(tool[:3]))
+    assert np.all(apart[known] < 5.0 * found.tool_sigma[:3][known] + 1e-8)
+
+
+def test_a_base_that_is_moved_is_told_although_no_number_of_it_is_determined():
+    found = controller_arm(RIG, poses(NominalArm(links()), SIDEWAYS, BASE, at=about(6)))
+    assert found.parts == ("base",)
+    assert found.differences == ()
 
 
 def test_a_pose_that_was_written_at_another_time_is_left_out():

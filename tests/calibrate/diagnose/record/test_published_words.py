@@ -2,12 +2,22 @@
 
 import re
 
+import msgspec
 import numpy as np
 import pytest
 
+from acquisition.recording.checked import READINGS
+from acquisition.recording.examination import FOUND, NOT_EXAMINED, NOTHING, ExaminationRecord
+from calibeam.results.checked import CHECK_EXAMINATIONS
+from calibeam.results.controller_findings import CONTROLLER_ARM
+from calibrate.compare.encoder_zeros import ZERO
+from calibrate.compare.examinations import COMPARE_EXAMINATIONS, RECONCILE_EXAMINATIONS
 from calibrate.diagnose.assess.findings import named
 from calibrate.diagnose.assess.pulled_back import picture_driver
+from calibrate.diagnose.record.pose_examinations import POSE_EXAMINATIONS
+from calibrate.diagnose.record.schema import TORQUES_IN_MOTION
 from calibrate.diagnose.streams.continuity import Fault
+from calibrate.diagnose.streams.examinations import PAIRS, STREAM_EXAMINATIONS
 from calibrate.diagnose.streams.streams_of_recording import EXPLAINS, USUAL
 from calibrate.model.effects.catalogue import EFFECTS, missing_of, terms_of
 from calibrate.model.effects.curve import causes_of
@@ -88,7 +98,29 @@ def test_what_was_not_recorded_is_named_by_a_published_driver(lists):
 def test_shapes_and_physics_are_the_published_ones(lists):
     assert {shape.value for shape in Shape} == set(lists["Shapes"]) - {"order"}
     assert {effect.physics for effect in EFFECTS} <= set(lists["Physics"])
-    assert {*EXPLAINS, *USUAL, *(fault.value for fault in Fault)} <= set(lists["Physics"])
+    assert {*EXPLAINS, *USUAL, *(fault.value for fault in Fault), ZERO} <= set(lists["Physics"])
+
+
+def test_every_examination_stands_in_the_list_of_its_command(request):
+    text = (request.config.rootpath / "docs" / "formats.md").read_text(encoding="utf-8")
+    section = text.split("## Examinations", 1)[1].split("\n## ", 1)[0]
+    published = {
+        row[0].strip(): set(re.findall(r"`([^`]+)`", row[1]))
+        for row in re.findall(r"^\| (`\w+`[^|]*) \| ([^|]*) \|$", section, re.M)
+    }
+    of_streams = {one.what for one, _ in STREAM_EXAMINATIONS}
+    of_poses = {*(one.what for one, _ in POSE_EXAMINATIONS), CONTROLLER_ARM.what, TORQUES_IN_MOTION.what}
+    registered = {
+        "`check`": {one.what for one in CHECK_EXAMINATIONS},
+        "`diagnose` of settled samples": of_poses,
+        "`diagnose` of streams, beside those": {*of_streams, PAIRS.what, READINGS.what},
+        "`compare`": {one.what for one, _ in COMPARE_EXAMINATIONS},
+        "`reconcile`": {one.what for one in RECONCILE_EXAMINATIONS},
+    }
+    assert {command: published[command] for command in registered} == registered
+    keys = {name for row in published for name in re.findall(r"`(\w+)`", row)}
+    assert keys >= {field.name for field in msgspec.structs.fields(ExaminationRecord)}
+    assert published["`outcome`"] == {FOUND, NOTHING, NOT_EXAMINED, "limit"}
 
 
 def test_every_driver_can_be_drawn(drivers):
