@@ -202,8 +202,8 @@ def figures() -> tuple[Figure, ...]:
 
 
 TODAY = {
-    "files": 817,
-    "code": 88_000,
+    "files": 841,
+    "code": 91_000,
     "longest_function": 53,
     "one_importer": 2,
     "classes": 0,

@@ -82,10 +82,11 @@ def examined_names(records: Sequence[ExaminationRecord]) -> tuple[str, ...]:
 
 
 def not_examined_lines(records: Sequence[ExaminationRecord]) -> Iterator[str]:
-    """One line for each examination and reason, with its places and its remedy."""
-    groups: dict[tuple[str, str, str], list[str]] = {}
+    """One line for each examination and reason, with its places and its remedy; one for all that lack the same."""
+    groups: dict[tuple[str, str], list[ExaminationRecord]] = {}
     for one in not_examined(records):
-        groups.setdefault((one.what, one.reason, one.remedy), []).append(one.where)
-    for (what, reason, remedy), places in groups.items():
-        named = ", ".join(place for place in places if place)
-        yield f"{NOT_EXAMINED_LINE}{what}{f' ({named})' if named else ''}: {reason}; {remedy}"
+        groups.setdefault((one.what if one.expected else "", one.reason), []).append(one)
+    for (_, reason), alike in groups.items():
+        names = ", ".join(dict.fromkeys(one.what for one in alike))
+        places = ", ".join(one.where for one in alike if one.where)
+        yield f"{NOT_EXAMINED_LINE}{names}{f' ({places})' if places else ''}: {reason}; {alike[0].remedy}"

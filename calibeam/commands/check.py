@@ -21,7 +21,7 @@ from calibeam.console import Console
 from calibeam.devices.check import check_devices
 from calibeam.outcome import CheckFailed
 from calibeam.overwriting import writes
-from calibeam.results.checked import check_examinations, verdict_lines
+from calibeam.results.check_examinations import check_examinations, verdict_lines
 from calibeam.results.controller_findings import (
     RIG_FILE,
     arm_of_controller,

@@ -6,8 +6,8 @@ from collections.abc import Iterator
 
 from rich.table import Table
 
-from acquisition.recording.checked import READINGS
 from acquisition.recording.examination import not_examined_lines
+from acquisition.recording.recording_examinations import READINGS
 from calibeam.console import Console
 from calibrate.diagnose.record.schema import ClockRecord, DiagnosisFile, FindingRecord, TorquesRecord, of_poses
 from calibrate.model.effects.term import with_sigma

@@ -9,10 +9,10 @@ import msgspec
 import numpy as np
 
 from acquisition.recording import Recording, check
-from acquisition.recording.checked import READINGS, reading_examinations
 from acquisition.recording.examination import ExaminationRecord
 from acquisition.recording.motion_plan import no_torque
 from acquisition.recording.pose_plan import write_pose_plan
+from acquisition.recording.recording_examinations import READINGS, reading_examinations
 from acquisition.recording.rig import Rig, rig_sha256
 from calibeam.results.controller_findings import CONTROLLER_ARM, controller_notes, with_controller
 from calibeam.software import SOFTWARE

@@ -3,7 +3,7 @@
 `compare` takes recordings to one frozen record, the content of compare.json, version 1, as in docs/formats.md.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -16,6 +16,7 @@ from calibrate.compare.chain import (
     columns_of,
     differences,
 )
+from calibrate.compare.comparison_examinations import with_examinations
 from calibrate.compare.comparison_file import (
     ComparisonFile,
     DroppedRecord,
@@ -25,8 +26,7 @@ from calibrate.compare.comparison_file import (
     size_records,
 )
 from calibrate.compare.difference_explained import Explanation, explain, notes_of
-from calibrate.compare.encoder_zeros import joint_zeros, zero_mismatches_of
-from calibrate.compare.examinations import with_examinations
+from calibrate.compare.encoder_zeros import ZeroChange, joint_zeros, zero_mismatches_of
 from calibrate.compare.fit_to_simulation import Constant
 from calibrate.compare.link_differs import (
     ROUNDING,
@@ -93,10 +93,8 @@ def compare(
         found += zero_mismatches(zeros_rad)
     found += asked.left
     streams = stream_pairs(devices_of(measured), devices_of(simulated))
-    reports = stream_reports(measured, simulated, asked.found)
-    found += stream_mismatches(measured, simulated, reports, streams)
-    zeros = joint_zeros(*reports)
-    found += _unseen_in_samples(zero_mismatches_of(zeros), found)
+    zeros = joint_zeros(*(reports := stream_reports(measured, simulated, asked.found)))
+    found += stream_mismatches(measured, simulated, reports, streams) + _unseen_in_samples(zeros, found)
     found.sort(key=lambda one: one.order)
     explained = any(one.decides and one.level not in (Level.RIG, Level.STREAMS) for one in found)
     judged_links = tuple(_as_explained(one, asked, explained, pair[0]) for one in judged_links)
@@ -124,10 +122,10 @@ def compare(
     return with_examinations(file, measured, simulated, zeros)
 
 
-def _unseen_in_samples(zeros: Iterable[Mismatch], found: Sequence[Mismatch]) -> list[Mismatch]:
+def _unseen_in_samples(zeros: Sequence[ZeroChange], found: Sequence[Mismatch]) -> list[Mismatch]:
     """Zeros of second encoders that the samples have not shown already."""
     known = {one.where for one in found if one.level is Level.ENCODER_ZEROS}
-    return [one for one in zeros if one.where not in known]
+    return [one for one in zero_mismatches_of(zeros) if one.where not in known]
 
 
 def _refuse_wrong(recording: Recording) -> None:

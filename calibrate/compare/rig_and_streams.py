@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from acquisition.recording import Recording
 from calibrate.compare.chain import Difference
+from calibrate.compare.comparison_examinations import with_examinations
 from calibrate.compare.comparison_file import (
     ComparisonFile,
     Level,
@@ -17,7 +18,6 @@ from calibrate.compare.comparison_file import (
     difference_record,
 )
 from calibrate.compare.encoder_zeros import pair_zeros, zero_mismatches_of
-from calibrate.compare.examinations import with_examinations
 from calibrate.compare.fit_to_simulation import SimulationFit
 from calibrate.compare.link_differs import JudgedLink
 from calibrate.compare.rig_keys import RigKey, rig_differences

@@ -11,7 +11,7 @@ from acquisition.recording.check_recording import Problem
 from acquisition.recording.examination import Examination
 from acquisition.recording.rig import rig_text
 from calibeam.cli import run
-from calibeam.results.checked import CHECK_EXAMINATIONS, verdict_lines
+from calibeam.results.check_examinations import CHECK_EXAMINATIONS, verdict_lines
 
 RIG = Path(__file__).parents[2] / "rigs" / "encoders.toml"
 ROWS, RATE_HZ = 2000, 100.0

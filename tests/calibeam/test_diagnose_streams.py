@@ -14,7 +14,7 @@ from benchmarks.stream_cases import JOINT_NOISE_RAD, servo_scene
 from benchmarks.stream_devices import devices_of_scene
 from calibeam.cli import run
 from calibeam.results import diagnosis
-from calibrate.diagnose.streams.examinations import STREAM_EXAMINATIONS
+from calibrate.diagnose.streams.stream_examinations import STREAM_EXAMINATIONS
 from simulators.conceal.case import conceal
 from simulators.conceal.case_files import write_case
 from simulators.conceal.wanted import Wanted

@@ -15,11 +15,15 @@ from acquisition.recording.examination import FOUND, NOT_EXAMINED, Examination, 
 from acquisition.recording.rig import load_rig, rig_text
 from benchmarks.stream_cases import servo_scene
 from benchmarks.stream_devices import devices_of_scene
-from calibeam.results.checked import CHECK_EXAMINATIONS, check_examinations, verdict_lines
+from calibeam.results.check_examinations import CHECK_EXAMINATIONS, check_examinations, verdict_lines
 from calibeam.results.comparison import compare
 from calibeam.results.controller_findings import arm_of_controller
 from calibeam.results.diagnosis import DIAGNOSE_EXAMINATIONS, diagnose_recording, diagnose_streams
-from calibrate.compare.examinations import COMPARE_EXAMINATIONS
+from calibeam.results.motion_reconciliation import reconcile_torques
+from calibeam.results.reconciliation import reconcile
+from calibrate.compare.comparison_examinations import COMPARE_EXAMINATIONS
+from calibrate.compare.reconciled_rows import RECONCILE_EXAMINATIONS, examined
+from calibrate.diagnose.record.schema import TORQUES_IN_MOTION
 from calibrate.errors import DataError
 from calibrate.report.diagnosis import verdict_words
 from simulators.conceal.case import conceal
@@ -252,3 +256,26 @@ def test_check_of_poses(poses, examination, column, way):
 def test_compare_of_poses_and_motions(poses, loaded, examination, column, way):
     recording = poses if "readings" in examination.needs else replace(poses, streams=loaded.streams)
     assert_not_examined(beside(recording), spoilt(recording, column, way), examination)
+
+
+@pytest.mark.parametrize(
+    ("examination", "column", "way"), cases(tuple(e for e in RECONCILE_EXAMINATIONS if "tau" in e.needs))
+)
+def test_reconcile_of_a_motion(loaded, examination, column, way):
+    left_out = reconcile_torques(spoilt(loaded, column, way), None, "rig.toml")
+    assert isinstance(left_out, ExaminationRecord)
+    assert (left_out.what, left_out.outcome) == (examination.what, NOT_EXAMINED)
+
+
+@pytest.mark.parametrize(
+    ("examination", "column", "way"), cases(tuple(e for e in RECONCILE_EXAMINATIONS if "readings" in e.needs))
+)
+def test_reconcile_of_poses(poses, examination, column, way):
+    none = TORQUES_IN_MOTION.not_examined("no torques of the joints were recorded", expected=False)
+
+    def reconciled(recording: Recording) -> Ended:
+        file = examined(reconcile(recording, poses.rig_text, "rig.toml").file, none)
+        return Ended(file.examinations, file.verdict)
+
+    few = replace(poses, samples=poses.samples.take(np.arange(20)))  # of more a whole diagnosis follows
+    assert_not_examined(reconciled, spoilt(few, column, way), examination)

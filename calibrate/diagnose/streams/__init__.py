@@ -2,9 +2,9 @@
 
 from calibrate.diagnose.streams.clock import ClockFit, ClockStatus, clock_between
 from calibrate.diagnose.streams.encoder_pairs import examine_encoders
-from calibrate.diagnose.streams.examinations import STREAM_EXAMINATIONS
 from calibrate.diagnose.streams.examine import StreamReport
 from calibrate.diagnose.streams.recorded import StreamDevice, devices_of
+from calibrate.diagnose.streams.stream_examinations import STREAM_EXAMINATIONS
 from calibrate.diagnose.streams.stream_findings import StreamFinding
 from calibrate.diagnose.streams.streams_of_recording import sample_windows, streams_of, with_streams
 from calibrate.diagnose.streams.track import Outcome, Track, white_noise

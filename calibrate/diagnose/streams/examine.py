@@ -14,12 +14,12 @@ from calibrate.diagnose.streams.clock_faults import judged, lateness, shares_hos
 from calibrate.diagnose.streams.coarse_clock import Ticks
 from calibrate.diagnose.streams.continuity import Fault, breaks
 from calibrate.diagnose.streams.deflection import Deflection, deflections
-from calibrate.diagnose.streams.examinations import StreamsSeen, stream_examinations
 from calibrate.diagnose.streams.following import Following, following
 from calibrate.diagnose.streams.recorded import StreamDevice, by_host, start_between
 from calibrate.diagnose.streams.ringing import Levers, ringing
 from calibrate.diagnose.streams.settling import Stand, Window, stands_of, unsettled
 from calibrate.diagnose.streams.slips import Causes, Slips, slips
+from calibrate.diagnose.streams.stream_examinations import StreamsSeen, stream_examinations
 from calibrate.diagnose.streams.stream_findings import (
     StreamFinding,
     break_findings,

@@ -32,11 +32,11 @@ from calibrate.diagnose.record.schema import (
 from calibrate.diagnose.state.fitted import Fitted
 from calibrate.diagnose.streams.angle_offsets import GravityLevers
 from calibrate.diagnose.streams.clock import ClockFit
-from calibrate.diagnose.streams.examinations import stream_examinations_left_out
 from calibrate.diagnose.streams.examine import Predicted, StreamReport, examine
 from calibrate.diagnose.streams.recorded import StreamDevice, by_host, devices_of
 from calibrate.diagnose.streams.settling import Window
 from calibrate.diagnose.streams.slips import causes_of
+from calibrate.diagnose.streams.stream_examinations import stream_examinations_left_out
 from calibrate.diagnose.streams.stream_findings import StreamFinding
 from calibrate.model.arms.catalogue import arm_of
 from calibrate.model.parameters import start_values

@@ -3,8 +3,8 @@
 import re
 from collections.abc import Iterator, Sequence
 
-from acquisition.recording.checked import READINGS
 from acquisition.recording.examination import FOUND, all_examined, examined_names, not_examined
+from acquisition.recording.recording_examinations import READINGS
 from calibrate.diagnose.assess import Statement
 from calibrate.diagnose.record.pose_examinations import PHYSICS
 from calibrate.diagnose.record.schema import (

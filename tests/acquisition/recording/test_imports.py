@@ -33,7 +33,7 @@ DOORS = {  # single modules that are open beside the faces: vocabularies, and wh
             "can_frames",
             "can_log",
             "check_recording",
-            "checked",
+            "recording_examinations",
             "device_clock",
             "examination",
             "files.bounds",

@@ -6,18 +6,18 @@ import msgspec
 import numpy as np
 import pytest
 
-from acquisition.recording.checked import READINGS
 from acquisition.recording.examination import FOUND, NOT_EXAMINED, NOTHING, ExaminationRecord
-from calibeam.results.checked import CHECK_EXAMINATIONS
+from acquisition.recording.recording_examinations import READINGS
+from calibeam.results.check_examinations import CHECK_EXAMINATIONS
 from calibeam.results.controller_findings import CONTROLLER_ARM
+from calibrate.compare.comparison_examinations import COMPARE_EXAMINATIONS, RECONCILE_EXAMINATIONS
 from calibrate.compare.encoder_zeros import ZERO
-from calibrate.compare.examinations import COMPARE_EXAMINATIONS, RECONCILE_EXAMINATIONS
 from calibrate.diagnose.assess.findings import named
 from calibrate.diagnose.assess.pulled_back import picture_driver
 from calibrate.diagnose.record.pose_examinations import POSE_EXAMINATIONS
 from calibrate.diagnose.record.schema import TORQUES_IN_MOTION
 from calibrate.diagnose.streams.continuity import Fault
-from calibrate.diagnose.streams.examinations import PAIRS, STREAM_EXAMINATIONS
+from calibrate.diagnose.streams.stream_examinations import PAIRS, STREAM_EXAMINATIONS
 from calibrate.diagnose.streams.streams_of_recording import EXPLAINS, USUAL
 from calibrate.model.effects.catalogue import EFFECTS, missing_of, terms_of
 from calibrate.model.effects.curve import causes_of

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 
 from acquisition.recording import Finding, Recording
 from acquisition.recording.check_recording import Problem
-from acquisition.recording.checked import RECORDING_EXAMINATIONS, recording_examinations
 from acquisition.recording.examination import (
     FOUND,
     Examination,
@@ -14,6 +13,7 @@ from acquisition.recording.examination import (
     examined_names,
     not_examined_lines,
 )
+from acquisition.recording.recording_examinations import RECORDING_EXAMINATIONS, recording_examinations
 from calibeam.results.controller_findings import CONTROLLER_ARM, controller_examination
 from calibrate.diagnose.streams import devices_of, examine_encoders
 from calibrate.fit.controller_arm import ControllerArm

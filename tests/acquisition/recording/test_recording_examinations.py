@@ -7,7 +7,12 @@ import numpy as np
 import pytest
 
 from acquisition.recording import Channel, RecordingWriter, check, read
-from acquisition.recording.checked import READINGS, RECORDING_EXAMINATIONS, reading_examinations, recording_examinations
+from acquisition.recording.recording_examinations import (
+    READINGS,
+    RECORDING_EXAMINATIONS,
+    reading_examinations,
+    recording_examinations,
+)
 from acquisition.recording.rig import rig_text
 
 RIGS = Path(__file__).parents[3] / "rigs"

@@ -54,9 +54,9 @@ class StreamsSeen:
         """Which of these devices was not recorded, or holds no valid row, in words; empty: all are there."""
         absent = [NAMES[name] for name in needed if name not in self.devices]
         if absent:
-            return f"{' and '.join(absent)} {'was' if len(absent) == 1 else 'were'} not recorded"
+            return f"not recorded: {', '.join(absent)}"
         empty = [NAMES[name] for name in needed if not np.isfinite(self.devices[name].track.values).any()]
-        return f"{' and '.join(empty)} without one valid reading" if empty else ""
+        return f"without one valid reading: {', '.join(empty)}" if empty else ""
 
     def expects(self, *about: str) -> bool:
         """Whether one of the devices that an examination is about was recorded, or is one of the rig's."""
@@ -64,11 +64,11 @@ class StreamsSeen:
 
 
 NAMES = {
-    "command": "the set-point (cmd)",
-    "joints": "the angles of the joints (q)",
+    "command": "set-points (cmd)",
+    "joints": "angles of the joints (q)",
     "encoders": "second encoders (enc)",
-    "spots": "the detectors' photocurrents",
-    "torque": "the torques of the joints (tau)",
+    "spots": "photocurrents of the detectors",
+    "torque": "torques of the joints (tau)",
 }
 
 CONTINUITY = Examination(
