@@ -40,7 +40,7 @@ RECORDS = (
 PRIVATE = (camera._File, read._ChannelRow)  # pyright: ignore[reportPrivateUsage] - records of one reader
 # Read by the program that wrote them, in one run or in a sealed folder; nobody edits them.
 OWN = {"Truth": "prove", "Begun": "prove", "ProofFile": "prove", "Task": "fleet", "ReconcileFile": "prove"}
-OUR_READERS = {"recording_examinations", "read_json"}
+OUR_READERS = {"checked", "read_json"}
 READERS = {"decode", "convert", *OUR_READERS}
 UPPER, LOWER = ("le", "lt"), ("ge", "gt")
 

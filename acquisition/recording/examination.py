@@ -15,6 +15,7 @@ from acquisition.recording.files.bounds import Label, Sentence, Statistic
 
 Ending = Literal["found", "nothing found", "not examined"]
 FOUND, NOTHING, NOT_EXAMINED = "found", "nothing found", "not examined"
+NO_REMEDY = "no remedy is needed"  # of what the rig does not have; such lines are not printed
 NOT_EXAMINED_LINE = f"{NOT_EXAMINED}: "
 
 
@@ -84,7 +85,7 @@ def examined_names(records: Sequence[ExaminationRecord]) -> tuple[str, ...]:
 def not_examined_lines(records: Sequence[ExaminationRecord]) -> Iterator[str]:
     """One line for each examination and reason, with its places and its remedy; one for all that lack the same."""
     groups: dict[tuple[str, str], list[ExaminationRecord]] = {}
-    for one in not_examined(records):
+    for one in (one for one in not_examined(records) if one.remedy != NO_REMEDY):
         groups.setdefault((one.what if one.expected else "", one.reason), []).append(one)
     for (_, reason), alike in groups.items():
         names = ", ".join(dict.fromkeys(one.what for one in alike))

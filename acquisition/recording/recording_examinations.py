@@ -10,7 +10,7 @@ import numpy as np
 
 from acquisition.recording.can_frames import is_frames
 from acquisition.recording.check_recording import Finding, Problem, Severity, is_log
-from acquisition.recording.examination import Examination, ExaminationRecord
+from acquisition.recording.examination import NO_REMEDY, Examination, ExaminationRecord
 from acquisition.recording.recording import Recording, Stream
 from acquisition.recording.sampling import STEP_S, STEP_SIGMAS, SamplingStatus
 from acquisition.recording.stamp_findings import BURSTY_SHARE, judge_stamps
@@ -54,10 +54,10 @@ IN_STREAMS = (Problem.SILENT, Problem.GAP, Problem.TIME_ORDER, Problem.DUPLICATE
 def _samples(checked: Checked) -> Records:
     times_s, log = checked.recording.samples.column("t_s"), is_log(checked.recording)
     found = checked.sentences("samples")
-    if log and not len(times_s):
-        return  # a log, or a rig without an arm that settles
     if found:
         yield SAMPLES.found(found)
+    elif log and not len(times_s):
+        yield SAMPLES.not_examined("a log has no settled samples", expected=False, remedy=NO_REMEDY)
     elif np.isfinite(times_s).sum() < 2 or not np.ptp(times_s[np.isfinite(times_s)]) > 0.0:
         yield SAMPLES.not_examined(f"{len(times_s)} settled samples with times that rise")
     else:
@@ -118,19 +118,28 @@ def _of_sampling(stream: Stream, where: str) -> ExaminationRecord:
 
 def _readings(checked: Checked) -> Records:
     streams = [s for s in checked.recording.streams.values() if POSITION in s.values]
-    if not streams and checked.recording.rig.n_joints == 0:
-        yield READINGS.not_examined("no readings of encoders were recorded")
+    if not streams:
+        alone, why = checked.recording.rig.n_joints == 0, "no readings of encoders were recorded"
+        expected = alone or (checked.recording.rig.devices.encoders is not None and is_log(checked.recording))
+        yield READINGS.not_examined(why, expected=expected, remedy="" if expected else NO_REMEDY)
     for stream in streams:
         where = f"stream {stream.name}"
         values = stream.values[POSITION]
         values = values.reshape(len(values), int(np.prod(values.shape[1:])))  # also without one row
         found = checked.sentences(where, Problem.READINGS) or checked.sentences("file", Problem.READINGS)
-        read = values[:, np.isfinite(values).any(axis=0)]  # a joint without an encoder has no reading at all
+        answers = np.isfinite(values).any(axis=0)
+        if checked.recording.rig.n_joints == 0:  # else it is a joint without a second encoder
+            silent = (np.flatnonzero(~answers) + 1 if answers.any() else np.array([], dtype=int)).tolist()
+            yield from (READINGS.not_examined("not one valid reading came", f"encoder {k}") for k in silent)
+        read = values[:, answers]
         missing = np.isnan(read)
         if found:
             yield READINGS.found(found, where)
         elif not missing.size or np.mean(missing) > MOST_MISSING:
-            yield READINGS.not_examined(f"only {int(np.isfinite(values).sum())} valid readings came", where)
+            few = int(np.isfinite(values).sum())
+            yield READINGS.not_examined(
+                f"only {few} valid readings came" if few else "not one valid reading came", where
+            )
         elif len(values) < FEWEST_ROWS:
             yield READINGS.not_examined(f"only {len(values)} rows", where)
         elif missing.any():

@@ -6,6 +6,7 @@ from itertools import groupby
 from rich.table import Table
 from rich.text import Text
 
+from acquisition.recording.examination import ExaminationRecord, not_examined, not_examined_lines
 from calibeam.console import Console
 from calibeam.printing.results import print_diagnosis
 from calibrate.compare import comparison_file
@@ -41,6 +42,8 @@ def print_comparison(console: Console, file: ComparisonFile, *, verbose: bool = 
         console.print(line, highlight=False, markup=False)
     for note in file.notes:
         console.print(note, highlight=False, markup=False)
+    for line in _not_examined(file.examinations, verbose=verbose):
+        console.print(line, highlight=False, markup=False)
     if file.torques is not None:
         console.print(_torques(file.torques))
         console.print(file.torques.made, highlight=False, markup=False)
@@ -195,7 +198,14 @@ def print_reconciliation(console: Console, file: ReconcileFile) -> None:
         _say(console, line)
     _list(console, "what the simulation lacks:", [one.says for one in file.left_out])
     _list(console, "what remains:", file.remains)
+    for line in _not_examined(file.examinations):
+        _say(console, line)
     _list(console, "what to do next:", file.next if file.remains else ())
+
+
+def _not_examined(records: Sequence[ExaminationRecord], *, verbose: bool = False) -> Iterator[str]:
+    """What rig and recordings allow and what did not take place; `verbose`: the rest, too."""
+    yield from not_examined_lines([one for one in not_examined(records) if one.expected or verbose])
 
 
 def _torque_lines(file: ReconcileFile) -> Iterator[str]:

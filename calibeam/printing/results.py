@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from rich.table import Table
 
-from acquisition.recording.examination import not_examined_lines
+from acquisition.recording.examination import not_examined, not_examined_lines
 from acquisition.recording.recording_examinations import READINGS
 from calibeam.console import Console
 from calibrate.diagnose.record.schema import ClockRecord, DiagnosisFile, FindingRecord, TorquesRecord, of_poses
@@ -67,7 +67,10 @@ def _brief(file: DiagnosisFile) -> Iterator[str]:
     yield from _few([f"noise: {line}" for line in noise_words(file)])
     yield from limit_words(file)
     yield from _few([f"not completed: {one.stage}: {one.reason}" for one in file.incomplete])
-    yield from _few(list(not_examined_lines(file.examinations)))
+    left = not_examined(file.examinations)
+    yield from _few(list(not_examined_lines([one for one in left if one.expected])))
+    if others := dict.fromkeys(one.what for one in left if not one.expected):
+        yield f"not recorded, and not examined: {', '.join(others)} (--verbose)"
     yield from _few(missing_lines(file))
     yield from _few([f"next: {line}" for line in file.next])
 

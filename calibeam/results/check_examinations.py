@@ -4,9 +4,10 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 from acquisition.recording import Finding, Recording
-from acquisition.recording.check_recording import Problem
+from acquisition.recording.check_recording import Problem, Severity
 from acquisition.recording.examination import (
     FOUND,
+    NO_REMEDY,
     Examination,
     ExaminationRecord,
     all_examined,
@@ -42,9 +43,11 @@ def _pairs(checked: CheckedRecording) -> Iterator[ExaminationRecord]:
     alone = checked.recording.rig.n_joints == 0
     device = devices_of(checked.recording).get("encoders") if alone else None
     if device is None:
-        if alone:
-            yield PAIRS.not_examined("no readings of encoders were recorded")
+        why = "no readings of encoders were recorded" if alone else "the encoders are those of an arm's joints"
+        yield PAIRS.not_examined(why, expected=alone, remedy="" if alone else NO_REMEDY)
         return
+    if device.track.channels < 2:
+        yield PAIRS.not_examined("there is one encoder only", expected=False, remedy=NO_REMEDY)
     for pair in examine_encoders(device)[1]:
         slips = [Size(one.size_rad, one.sigma_rad) for one in pair.slips]
         where, found = f"encoder {pair.number}", "; ".join(_in_words(pair.once_rad, slips))
@@ -65,6 +68,8 @@ def _in_words(once: Size | None, slips: Sequence[Size]) -> Iterator[str]:
 def _controller(checked: CheckedRecording) -> Iterator[ExaminationRecord]:
     if checked.recording.rig.n_joints:
         yield controller_examination(checked.recording, checked.arm)
+    else:
+        yield CONTROLLER_ARM.not_examined("the rig has no arm", expected=False, remedy=NO_REMEDY)
 
 
 BEYOND_THE_RECORDING: tuple[tuple[Examination, Callable[[CheckedRecording], Iterator[ExaminationRecord]]], ...] = (
@@ -77,7 +82,7 @@ CHECK_EXAMINATIONS = tuple(one for one, _ in (*RECORDING_EXAMINATIONS, *BEYOND_T
 def check_examinations(
     recording: Recording, findings: tuple[Finding, ...], arm: ControllerArm | None
 ) -> tuple[ExaminationRecord, ...]:
-    """The endings of all examinations of `check` that are about something that the rig has."""
+    """The endings of all examinations of `check`."""
     checked = CheckedRecording(recording, findings, arm)
     beyond = (record for _, examine in BEYOND_THE_RECORDING for record in examine(checked))
     return (*recording_examinations(recording, findings), *beyond)
@@ -93,7 +98,12 @@ def verdict_lines(findings: Sequence[Finding], examinations: Sequence[Examinatio
     elif not examined_names(examinations):
         yield "nothing was examined: the reasons are above"
     elif not all_examined(examinations):
-        yield f"nothing wrong in what was examined: {', '.join(examined_names(examinations))}"
+        found = dict.fromkeys(one.what for one in examinations if one.outcome == FOUND)
+        rest = [name for name in examined_names(examinations) if name not in found]
+        seen = f"see above what was found: {', '.join(found)}; " if found else ""
+        yield f"{seen}nothing wrong in what was examined: {', '.join(rest) or 'the rest'}"
+    elif any(finding.severity is Severity.WARNING for finding in findings):
+        yield "no errors; see the warnings above"
     elif any(one.outcome == FOUND for one in examinations):
         yield "no errors; see above what was found"
     else:

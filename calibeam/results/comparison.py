@@ -12,6 +12,7 @@ from calibeam.simulation.described_torques import described_torques
 from calibeam.software import SOFTWARE
 from calibrate.compare import compare_recordings
 from calibrate.compare.compared_torques import torques_compared
+from calibrate.compare.comparison_examinations import with_torque_examination
 from calibrate.compare.comparison_file import ComparisonFile
 from calibrate.compare.rig_and_streams import compare_logs
 from calibrate.diagnose.motion import diagnose_torques
@@ -50,4 +51,4 @@ def compare_torques(measured: Recording, simulation: Path, samples: ComparisonFi
     found = diagnose_torques(measured, np.random.default_rng(SEED), known)
     if isinstance(found, ExaminationRecord):
         raise DataError(f"torques are not compared: {found.reason}; {found.remedy}; or compare without --simulation")
-    return torques_compared(measured, known, found, SOFTWARE, samples)
+    return with_torque_examination(torques_compared(measured, known, found, SOFTWARE, samples), measured)

@@ -123,6 +123,8 @@ def _tool(found: ControllerArm) -> str:
     along, about = (sigma[:3].tolist(), sigma[3:].tolist())
     at = ", ".join(length_with_sigma(v, s) if np.isfinite(s) else open_ for v, s in zip(point, along, strict=True))
     turned = ", ".join(angle_with_sigma(v, s) if np.isfinite(s) else open_ for v, s in zip(turn, about, strict=True))
+    if not np.any(np.isfinite(along)):
+        return f"the place of its tool is not determined ({REMEDY})"
     says = f"its tool is at {at} in the flange (x, y, z), turned by {turned} about x, y, z"
     return says if np.all(np.isfinite(sigma)) else f"{says} ({REMEDY})"
 

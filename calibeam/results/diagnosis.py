@@ -27,7 +27,7 @@ from calibrate.diagnose.motion import (
 )
 from calibrate.diagnose.new_poses import plan_of, separating
 from calibrate.diagnose.record.file import write_diagnosis
-from calibrate.diagnose.record.pose_examinations import POSE_EXAMINATIONS, pose_examinations
+from calibrate.diagnose.record.pose_examinations import POSE_EXAMINATIONS, REPORT, pose_examinations
 from calibrate.diagnose.record.schema import (
     SCHEMA,
     TORQUES_IN_MOTION,
@@ -56,7 +56,6 @@ DIAGNOSE_EXAMINATIONS = (
     TORQUES_IN_MOTION,
     CONTROLLER_ARM,
 )
-REPORT = "report the recording as a fault of the program"
 NEXT_OF_AN_ARM = "record settled samples: streams alone show clocks, lags and faults, nothing of the geometry"
 NEXT_OF_ENCODERS = (
     "`calibeam check LOG` shows pace, eccentricity, slips and noise of the encoders; `calibeam compare ONE TWO` "

@@ -21,6 +21,7 @@ from calibrate.compare.comparison_file import (
 from calibrate.compare.mismatches import LACKING, SIDES
 from calibrate.diagnose.assess import Finding, Verdict
 from calibrate.diagnose.motion import TorqueDiagnosis
+from calibrate.diagnose.stages import DECIDING
 from calibrate.model.effects.term import Size
 from calibrate.model.effects.torque import masses_and_springs
 from calibrate.model.parameters import start_values
@@ -45,7 +46,8 @@ def torques_compared(
     records = [*file.differences, *(difference_record(one, None) for one in (*differ, *left))]
     levels = [level.value for level in Level]
     records.sort(key=lambda one: levels.index(one.level))
-    own = Verdict.MISMATCH if differ else Verdict.UNDECIDABLE if left else Verdict.CONSISTENT
+    failed = any(one.stage in DECIDING for one in found.diagnosis.incomplete)
+    own = Verdict.MISMATCH if differ else Verdict.UNDECIDABLE if left or failed else Verdict.CONSISTENT
     says = _says(own, len(differ), known.source)
     return structs.replace(
         file,

@@ -175,13 +175,22 @@ def with_examinations(
     return _with_verdict(structs.replace(file, examinations=records))
 
 
+def with_torque_examination(file: ComparisonFile, measured: Recording) -> ComparisonFile:
+    """A comparison of torques, alone or beside the samples, whose examinations it keeps."""
+    if not file.examinations:
+        return with_examinations(file, measured, None)
+    others = tuple(one for one in file.examinations if one.what != TORQUES_IN_MOTION.what)
+    return structs.replace(file, examinations=(*others, *_torques(ComparedPair(file, measured, None))))
+
+
 def _with_verdict(file: ComparisonFile) -> ComparisonFile:
     """The two agree only where all that both allow was examined; without readings or torques nothing is decided."""
     if file.verdict != Verdict.CONSISTENT.value or all_examined(file.examinations):
         return file
     deciding = (READINGS.what, TORQUES_IN_MOTION.what, SECOND_ZEROS.what, STREAMS.what)
     names = [one for one in examined_names(file.examinations) if one in deciding]
-    left = ", ".join(dict.fromkeys(one.what for one in not_examined(file.examinations) if one.expected))
+    missing = not_examined(file.examinations)
+    left = ", ".join(dict.fromkeys(one.what for one in missing if one.expected or not names))
     if not names:
         return structs.replace(file, verdict=Verdict.UNDECIDABLE.value, says=f"Not examined: {left}.")
     says = f"No difference was found in what was examined ({', '.join(names)}); not examined: {left}."

@@ -12,6 +12,7 @@ from calibrate.quantities import angle_with_sigma
 
 ZERO = "encoder-zero-moved"
 SIGMAS = 5.0  # of a change that is reported
+DISCS_RAD = 1.5e-3  # five sigmas of usual discs off their centres: over other angles they show another level
 
 
 @dataclass(frozen=True)
@@ -54,7 +55,8 @@ def _levels(report: StreamReport | None) -> Mapping[int, tuple[Size, float]]:
     offsets = () if report is None else report.offsets.get("encoders", ())
     levels = {o.joint: (o.stretches[0].offset, o) for o in offsets if o.stretches and o.steady}
     return {
-        joint: (Size(at.value + one.zero_rad, at.sigma), one.limit_rad or 0.0) for joint, (at, one) in levels.items()
+        joint: (Size(at.value + one.zero_rad, at.sigma), max(one.limit_rad or 0.0, DISCS_RAD))
+        for joint, (at, one) in levels.items()
     }
 
 

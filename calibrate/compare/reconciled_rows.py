@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from acquisition.recording import Recording, Samples
-from acquisition.recording.examination import Examination, ExaminationRecord
+from acquisition.recording.examination import Examination, ExaminationRecord, not_examined
 from acquisition.recording.rig import Rig
 from acquisition.recording.samples import ORIENTATION, POSITION, SPOTS, WIRE
 from calibrate.compare.comparison_file import ComparisonFile
@@ -298,7 +298,10 @@ RECONCILE_EXAMINATIONS = (POSES, TORQUES_IN_MOTION)
 
 def examined(file: ReconcileFile, torques: ExaminationRecord | object) -> ReconcileFile:
     """The reconciliation with how its two examinations ended. `torques`: why those took no part, where they did not."""
-    return msgspec.structs.replace(file, examinations=(_of_poses(file), _of_torques(file, torques)))
+    records = (_of_poses(file), _of_torques(file, torques))
+    left = ", ".join(one.what for one in not_examined(records) if one.expected)
+    says = f"{file.says} Not examined: {left}." if left and file.verdict == "agree" else file.says
+    return msgspec.structs.replace(file, says=says, examinations=records)
 
 
 def _of_poses(file: ReconcileFile) -> ExaminationRecord:

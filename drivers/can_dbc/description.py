@@ -21,7 +21,7 @@ SHOWN = 120  # characters of what a file holds, in an error
 FLOAT_STEPS = 1 << 40  # counts in 1.0 of a floating-point signal: finer than what 32 bits resolve of one turn
 MANTISSA_BITS = {16: 10, 32: 23, 64: 52}  # IEEE 754
 MOST_RAD = 1e5  # 16,000 turns: an encoder on the motor, over the whole travel of an axis with a gear
-ROUNDED = 1e-6  # of the span of a stated range, whose ends are written with some digits
+ROUNDED = 1e-3  # of the span of a stated range: an end of 3.14 or 3.1416 is half a turn
 CHANCE = 0.01  # of a turn
 UNITS_RAD = {
     "rad": 1.0,
@@ -170,7 +170,7 @@ def _range(signal: Signal, units_per_turn: float) -> tuple[float, bool]:
     counts = (ends[1] - ends[0]) / abs(float(signal.scale))
     for steps in (counts * FLOAT_STEPS,) if signal.is_float else (counts, counts + 1.0):
         turns = round(steps / units_per_turn)
-        slack = ROUNDED * steps if signal.is_float else _slack(units_per_turn)
+        slack = ROUNDED * steps if signal.is_float else max(ROUNDED * steps, _slack(units_per_turn))
         if turns > 0 and abs(steps - turns * units_per_turn) < slack:
             return _whole(turns * units_per_turn), True
     return math.inf, False

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from calibeam.cli import run
-from calibrate.compare.comparison_examinations import COMPARE_EXAMINATIONS, RECONCILE_EXAMINATIONS
+from calibrate.compare.comparison_examinations import COMPARE_EXAMINATIONS
+from calibrate.compare.reconciled_rows import RECONCILE_EXAMINATIONS
 from simulators.conceal.case import conceal
 from simulators.conceal.case_files import write_case
 from simulators.conceal.wanted import Wanted

@@ -18,7 +18,7 @@ from calibrate.diagnose.assess import limits
 from calibrate.diagnose.assess.diagnosis import Diagnosis, Finding, Verdict
 from calibrate.diagnose.diagnose import diagnose
 from calibrate.diagnose.motion.links_alone import torque_state
-from calibrate.diagnose.motion.motion_table import Motion, motion_of
+from calibrate.diagnose.motion.motion_table import MOVE, Motion, motion_of
 from calibrate.diagnose.motion.torque_state import TorqueState
 from calibrate.diagnose.record.schema import (
     TORQUE,
@@ -82,11 +82,14 @@ def _certain_changes(found: Diagnosis, known: TorquesOfModel) -> Diagnosis:
     """Without changes that the uncertainty of the known effects at their place may be: these entered as exact."""
 
     def is_certain(finding: Finding) -> bool:
-        name, size = next(iter(finding.parameters.items()))
-        unit = name.partition("_")[2]
         own = [e.parameters for e in known.effects if e.where == finding.name.where]
-        sigmas = [s.sigma or 0.0 for p in own for n, s in p.items() if n.partition("_")[2] == unit]
-        return abs(size.value) > limits.SIZE_SIGMAS * float(np.hypot(size.sigma, max(sigmas, default=0.0)))
+        sigmas = [(n.partition("_")[2], s.sigma or 0.0) for p in own for n, s in p.items()]
+        beyond = [
+            abs(size.value)
+            > limits.SIZE_SIGMAS * np.hypot(size.sigma, max((s for u, s in sigmas if u == unit), default=0))
+            for unit, size in ((name.partition("_")[2], size) for name, size in finding.parameters.items())
+        ]
+        return not beyond or any(beyond)
 
     findings = tuple(filter(is_certain, found.findings))
     nothing = not findings and found.verdict is Verdict.MISMATCH
@@ -102,10 +105,19 @@ def usual_friction(bare: TorqueState) -> tuple[Accepted, ...]:
     return tuple(Accepted(term, np.zeros(1), np.zeros(0)) for term in terms)
 
 
-def _examination(found: TorqueDiagnosis | ExaminationRecord) -> ExaminationRecord:
-    """How the examination of the torques ended."""
+def _examinations(found: TorqueDiagnosis | ExaminationRecord) -> tuple[ExaminationRecord, ...]:
+    """How the examination of the torques ended, and the joints that took no part."""
     if isinstance(found, ExaminationRecord):
-        return found
+        return (found,)
+    still = [j for j, column in enumerate(found.motion.torque_nm.T, start=1) if not np.isfinite(column).any()]
+    left_out = (
+        TORQUES_IN_MOTION.not_examined("it does not move for long enough, or has no torque", f"joint{j}", remedy=MOVE)
+        for j in still
+    )
+    return (_ending(found), *left_out)
+
+
+def _ending(found: TorqueDiagnosis) -> ExaminationRecord:
     said = found.diagnosis
     deciding = [one for one in said.incomplete if one.stage in DECIDING]
     if said.findings or said.unexplained:
@@ -115,12 +127,13 @@ def _examination(found: TorqueDiagnosis | ExaminationRecord) -> ExaminationRecor
     if deciding:
         failed = "; ".join(f"{one.stage.value}: {one.reason}" for one in deciding)
         return TORQUES_IN_MOTION.not_examined(f"a stage failed: {failed}", remedy="report the recording as a fault")
-    return TORQUES_IN_MOTION.nothing(float(found.model.noise_nm.max()), "Nm")
+    moved = np.isfinite(found.motion.torque_nm).any(axis=0)
+    return TORQUES_IN_MOTION.nothing(float(found.model.noise_nm[moved].max()), "Nm")
 
 
 def with_torques(file: DiagnosisFile, found: TorqueDiagnosis | ExaminationRecord) -> DiagnosisFile:
     """The diagnosis with what the torques show; findings of samples and streams stay in front."""
-    examined = structs.replace(file, examinations=(*file.examinations, _examination(found)))
+    examined = structs.replace(file, examinations=(*file.examinations, *_examinations(found)))
     return examined if isinstance(found, ExaminationRecord) else _with_findings(examined, found)
 
 

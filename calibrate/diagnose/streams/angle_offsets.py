@@ -72,6 +72,7 @@ class AngleOffset:
         """Of two encoders: without what a slip or a measured torque explains, and what a disc off its centre may do."""
         stretches = self.stretches[:1] if stepped or self.outcome is not Outcome.FOUND else self.stretches
         usual = limits.OFFSET_SIGMAS * limits.USUAL_DISC_RAD
+        stretches = tuple(replace(s, found=s.found and abs(s.offset.value) > usual) for s in stretches)
         droop = None if self.droop is None or bent or self.droop.value < usual else self.droop
         found = droop is not None or len(stretches) > 1 or any(one.found for one in stretches)
         outcome = self.outcome if self.why else Outcome.FOUND if found else Outcome.ABSENT
@@ -206,7 +207,10 @@ def _fitted(means: _Means, columns: list[Floats]) -> _Fit | None:
 
 def _with_steps(means: _Means, columns: list[Floats], steps: tuple[int, ...]) -> _Fit | None:
     X = np.stack([*columns, *(_step(means, place) for place in steps)], axis=1)
-    line = fit(X, means.difference, means.block)
+    try:
+        line = fit(X, means.difference, means.block)
+    except np.linalg.LinAlgError:  # a block that alone determines a column
+        return None
     if line is None or not np.all(np.isfinite(line.covariance)):
         return None
     moving = slice(1, len(means.columns()))

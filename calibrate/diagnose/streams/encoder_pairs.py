@@ -102,7 +102,8 @@ def _pair(device: StreamDevice, k: int) -> EncoderPair:
     size = float(np.hypot(a, b))
     along = np.array([a, b]) / max(size, 1e-300)
     sigma = float(np.sqrt(along @ found.covariance[1:3, 1:3] @ along))
-    level = _level(other - sense * q - found.values[1] * np.cos(q) - found.values[2] * np.sin(q), found.sigma[0])
+    middle = float(other.mean() - sense * q.mean() + found.values[0])
+    level = _level(np.array([middle]), found.sigma[0])
     return EncoderPair(k + 1, Size(size, sigma), noise, slips, level_rad=None if slips else level)
 
 

@@ -78,6 +78,8 @@ def examine(
     """
     found, devices = _mended(devices)
     devices, silent = _answering(devices)
+    if "encoders" in stated:  # the rig has them, so that a joint without a reading has a silent one
+        silent |= _without_reading(devices)
     joints, command = devices.get("joints"), devices.get("command")
     if joints is None:
         nothing = StreamsSeen(devices, tuple(found), silent=silent, stated=stated)
@@ -142,6 +144,15 @@ def _answering(devices: dict[str, StreamDevice]) -> tuple[dict[str, StreamDevice
     silent = {track.joint(int(c)): f"read in {read[c]} of {rows} rows" for c in np.flatnonzero(~answers)}
     left = replace(encoders, track=track.of(np.flatnonzero(answers).tolist()))
     return {**devices, "encoders": left}, silent
+
+
+def _without_reading(devices: Mapping[str, StreamDevice]) -> dict[int, str]:
+    joints, encoders = devices.get("joints"), devices.get("encoders")
+    if joints is None or encoders is None:
+        return {}
+    there = {encoders.track.joint(c) for c in range(encoders.track.channels)}
+    rows = len(encoders.track.time_s)
+    return {j: f"read in 0 of {rows} rows" for j in range(1, joints.track.channels + 1) if j not in there}
 
 
 @dataclass(frozen=True, eq=False)

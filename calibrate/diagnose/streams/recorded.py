@@ -34,10 +34,12 @@ def devices_of(recording: Recording) -> Mapping[str, StreamDevice]:
     found = {
         "command": _of(recording, COMMAND, "command"),
         "joints": _of(recording, JOINTS, "joints"),
-        "encoders": _of_some_joints(_of(recording, ENCODERS, "encoders")),
+        "encoders": _of(recording, ENCODERS, "encoders"),
         "spots": _spots(recording),
         "torque": _torque(recording),
     }
+    if recording.rig.n_joints:  # of a log of encoders alone each one counts, also where it is silent
+        found["encoders"] = _of_some_joints(found["encoders"])
     return {name: device for name, device in found.items() if device is not None}
 
 

@@ -269,7 +269,9 @@ def _ringing(seen: StreamsSeen) -> Records:
         track = seen.devices["joints"].track.read()
         lasting = [s for s in seen.stands if (s.to_s - s.from_s) > limits.RINGING_SAMPLES * track.period_s]
         if len(lasting) < 2 or not np.any(np.ptp(track.values, axis=0) > limits.STANDS_RAD):
-            yield RINGING.not_examined("the arm does not stop after a motion for long enough", expected=False)
+            moves = len(track.time_s) > 0 and bool(np.any(np.ptp(track.values, axis=0) > limits.STANDS_RAD))
+            why = "the arm does not stop after a motion for long enough" if moves else "no joint moves in a valid row"
+            yield RINGING.not_examined(why, expected=not moves)
         else:
             noise = float(np.max(white_noise(track.values)))
             yield RINGING.nothing(max(noise, limits.FINEST_RAD), "rad")

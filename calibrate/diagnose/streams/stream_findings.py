@@ -184,7 +184,8 @@ def _offset_finding(stream: str, one: AngleOffset, stretch: OffsetStretch, *, ch
     size, which = stretch.offset, "offset_rad"
     if one.zeroless:  # its own beginning is the zero
         first = one.stretches[0].offset
-        size = Size(size.value - first.value, float(np.hypot(size.sigma, first.sigma)))
+        change = (size.value - first.value + np.pi) % (2.0 * np.pi) - np.pi
+        size = Size(float(change), float(np.hypot(size.sigma, first.sigma)))
         which = "change_rad"
     when = f" between {stretch.from_s:.2f} and {stretch.to_s:.2f} s" if changes else ""
     since = " than at the beginning" if one.zeroless else f" than {AGAINST[stream]} whatever the motion"

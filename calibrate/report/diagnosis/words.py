@@ -54,12 +54,12 @@ def verdict_words(file: DiagnosisFile) -> str:
             found = counted(len(file.findings), "change")
             return f"Recording and model differ: {found} found{_how_far(file)}."
         case "consistent" if file.known is not None:
-            return f"Nothing new: recording and model agree to within {_noise(file)}{_tested(file)}."
+            return f"Nothing new: recording and model agree to within {_noise(file)}{_tested(file)}{_unexamined(file)}."
         case "mismatch":
             found = counted(len(of_poses(file)), "cause")
             return f"Recording and model disagree: {found} found{_how_far(file)}."
         case "consistent":
-            return f"Recording and model agree: what remains is {_noise(file)}{_tested(file)}."
+            return f"Recording and model agree: what remains is {_noise(file)}{_tested(file)}{_unexamined(file)}."
         case _ if file.incomplete and file.unexplained is None:
             stages = ", ".join(one.stage for one in file.incomplete)
             return f"Undecidable: the diagnosis was not completed ({stages})."
@@ -83,6 +83,12 @@ def _streams_verdict(file: DiagnosisFile) -> str:
     more = "; readings of the encoders were left out" if left_out else ""
     more += f"; not examined: {_left_out(file)}" if _left_out(file) else ""
     return f"Streams only: {left} in what was examined ({examined}){poses}{more}."
+
+
+def _unexamined(file: DiagnosisFile) -> str:
+    """What else the recording allows and what did not take place, for the end of a verdict."""
+    left = _left_out(file)
+    return f"; not examined: {left}" if left else ""
 
 
 def _left_out(file: DiagnosisFile) -> str:

@@ -10,8 +10,9 @@ from acquisition.recording.examination import FOUND, NOT_EXAMINED, NOTHING, Exam
 from acquisition.recording.recording_examinations import READINGS
 from calibeam.results.check_examinations import CHECK_EXAMINATIONS
 from calibeam.results.controller_findings import CONTROLLER_ARM
-from calibrate.compare.comparison_examinations import COMPARE_EXAMINATIONS, RECONCILE_EXAMINATIONS
+from calibrate.compare.comparison_examinations import COMPARE_EXAMINATIONS
 from calibrate.compare.encoder_zeros import ZERO
+from calibrate.compare.reconciled_rows import RECONCILE_EXAMINATIONS
 from calibrate.diagnose.assess.findings import named
 from calibrate.diagnose.assess.pulled_back import picture_driver
 from calibrate.diagnose.record.pose_examinations import POSE_EXAMINATIONS
