@@ -9,10 +9,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from acquisition.recording import Channel, Recording, RecordingError, Samples, SamplesError, Stream, check, read
 from acquisition.recording.examination import FOUND, NOT_EXAMINED, Examination, ExaminationRecord
 from acquisition.recording.rig import load_rig, rig_text
+from acquisition.recording.samples import CONTROLLER
 from benchmarks.stream_cases import servo_scene
 from benchmarks.stream_devices import devices_of_scene
 from calibeam.results.check_examinations import CHECK_EXAMINATIONS, check_examinations, verdict_lines
@@ -25,6 +27,8 @@ from calibrate.compare.comparison_examinations import COMPARE_EXAMINATIONS
 from calibrate.compare.reconciled_rows import RECONCILE_EXAMINATIONS, examined
 from calibrate.diagnose.record.schema import TORQUES_IN_MOTION
 from calibrate.errors import DataError
+from calibrate.model.arms.catalogue import arm_of
+from calibrate.model.parameters import start_values
 from calibrate.report.diagnosis import verdict_words
 from simulators.conceal.case import conceal
 from simulators.conceal.case_files import write_case
@@ -40,6 +44,7 @@ CHANNELS = {
     "position_rad": ("position_rad",),
     "tau": ("joint_torque_nm",),
     "photocurrents": ("photocurrent_a",),
+    **dict.fromkeys(CONTROLLER, ("actual_tcp_pose_m_rad",)),
 }
 TIMES = ("host_s", "device_s", "sequence")
 
@@ -70,17 +75,26 @@ def loaded() -> Recording:
     rig_path = RIGS / "ur5e-dual-psd.toml"
     joints, encoders, spots = (devices[name] for name in ("joints", "encoders", "spots"))
     command = {"target_q_rad": devices["command"].track.values, "actual_q_rad": joints.track.values}
+    tool = {"actual_tcp_pose_m_rad": tool_poses(load_rig(rig_path), joints.track.values)}
     torque = {"joint_torque_nm": 20.0 * np.sin(joints.track.values)}
     u = np.repeat(spots.track.values, 2, axis=1) / 10.0
     currents = {"photocurrent_a": 1e-4 * (1.0 + u * np.tile([-1.0, 1.0], 4))}
     streams = {
-        "robot": stream("robot", joints, {**command, **torque}),
+        "robot": stream("robot", joints, {**command, **torque, **tool}),
         "encoders": stream("encoders", encoders, {"position_rad": encoders.track.values}),
         "psd": stream("psd", spots, currents),
     }
     rig = load_rig(rig_path)
     empty = Samples({"t_s": np.zeros(0)}, 6)
     return Recording(Path("motion.mcap"), rig_text(rig_path), rig, empty, True, streams=streams)
+
+
+def tool_poses(rig, q_rad):
+    """(row, 6) of the nominal flange: what a controller without faults reports."""
+    arm = arm_of(rig)
+    flange = arm.flange(start_values(arm.parameters), q_rad)
+    turns = Rotation.from_matrix(flange[:, :3, :3]).as_rotvec()
+    return np.concatenate([flange[:, :3, 3], turns], axis=1)
 
 
 @pytest.fixture(scope="module")
@@ -94,7 +108,7 @@ def poses(tmp_path_factory) -> Recording:
 def log(motion: Recording) -> Recording:
     """Three encoders on one shaft, without an arm."""
     turn = np.linspace(0.0, 15.0, 2000)
-    angle = np.stack([turn, 2.0 * 0.5 * turn + 0.3, turn + 1e-4 * np.sin(turn)], axis=1)
+    angle = np.stack([turn, 2.0 * 0.5 * turn + 0.3, turn - 0.7], axis=1)
     time_s = 0.01 * np.arange(len(turn))
     angle += 1e-6 * np.random.default_rng(1).standard_normal(angle.shape)
     one = Stream(
@@ -109,6 +123,8 @@ def log(motion: Recording) -> Recording:
 
 def spoilt(recording: Recording, column: str, way: str) -> Recording:
     """One column of a recording that shows nothing; of times those of all streams."""
+    if column == "sample events":
+        return replace(recording, events=())
     if column in TIMES:
         return replace(recording, streams=spoilt_times(recording.streams, way))
     if column in CHANNELS and recording.streams:
@@ -231,13 +247,21 @@ def test_check_of_a_log_of_encoders(log, examination, column, way):
 
 
 OF_POSES = tuple(e for e in (*CHECK_EXAMINATIONS, *DIAGNOSE_EXAMINATIONS) if e.what in OF_SAMPLES)
-OF_STREAMS = tuple(e for e in DIAGNOSE_EXAMINATIONS if e.what not in (*OF_LOG, *OF_SAMPLES, "samples taken unsettled"))
+OF_STREAMS = tuple(e for e in DIAGNOSE_EXAMINATIONS if e.what not in (*OF_LOG, *OF_SAMPLES))
+OF_CONTROLLER = tuple(e for e in CHECK_EXAMINATIONS if e.needs == CONTROLLER)
 
 
 @pytest.mark.parametrize(("examination", "column", "way"), cases(OF_STREAMS))
 def test_diagnose_of_a_motion(motion, loaded, examination, column, way):
     recording = loaded if "tau" in examination.needs else motion
     assert_not_examined(diagnosed, spoilt(recording, column, way), examination)
+
+
+@pytest.mark.parametrize("way", WAYS)
+@pytest.mark.parametrize("command", [checked, diagnosed])
+def test_the_arm_of_a_controller(motion, command, way):
+    (examination,) = OF_CONTROLLER
+    assert_not_examined(command, spoilt(motion, examination.needs[0], way), examination)
 
 
 @pytest.mark.parametrize(
@@ -279,3 +303,17 @@ def test_reconcile_of_poses(poses, examination, column, way):
 
     few = replace(poses, samples=poses.samples.take(np.arange(20)))  # of more a whole diagnosis follows
     assert_not_examined(reconciled, spoilt(few, column, way), examination)
+
+
+def test_the_recordings_that_are_spoilt_are_examined_while_they_are_whole(motion, loaded, log, poses):
+    """But for the clock of the spots, which a fitted model predicts, and samples, which a motion has not."""
+    of_motion = {one.what for one in diagnosed(motion).records if one.outcome != NOT_EXAMINED}
+    assert {e.what for e in OF_STREAMS if not {"tau", "photocurrents"} & set(e.needs)} <= of_motion
+    assert {e.what for e in OF_CONTROLLER} <= of_motion
+    assert "joint compliance between encoders" in {
+        one.what for one in diagnosed(loaded).records if one.outcome != NOT_EXAMINED
+    }
+    assert checked(log).verdict == "no errors"
+    assert {e.what for e in OF_POSES if e.needs == ("q", "readings")} <= {
+        one.what for one in diagnosed(poses).records if one.outcome != NOT_EXAMINED
+    }
