@@ -174,7 +174,9 @@ def _of_offsets(examination: Examination, stream: str, seen: StreamsSeen) -> Rec
         elif one.why or one.limit_rad is None:
             yield examination.not_examined(one.why, where)
         else:
-            yield examination.nothing(one.limit_rad, "rad", where)
+            against_zero = stream == "encoders" and not one.zeroless  # where discs off their centres may do as much
+            discs_rad = limits.OFFSET_SIGMAS * limits.USUAL_DISC_RAD if against_zero else 0.0
+            yield examination.nothing(max(one.limit_rad, discs_rad), "rad", where)
 
 
 def _clock(seen: StreamsSeen) -> Records:

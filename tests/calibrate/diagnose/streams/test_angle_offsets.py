@@ -304,3 +304,11 @@ def test_an_encoder_that_does_not_answer_is_named_and_the_others_are_examined(sc
         assert endings["joint2"].expected
         assert "wiring" in endings["joint2"].remedy
         assert set(endings) == {f"joint{j + 1}" for j in range(JOINTS)}
+
+
+def test_the_limit_beside_a_stated_zero_is_not_below_what_would_be_reported(scene):
+    """Discs off their centres make a millirad: less than five of their sigmas beside the zero is no finding."""
+    report = examine(seconds(scene, 1e-3), zeros_rad=[0.01] * JOINTS)
+    (one,) = [r for r in report.examinations if r.what == SECOND and r.where == "joint3"]
+    assert one.outcome == "nothing found"
+    assert one.limit > 1e-3
